@@ -77,7 +77,10 @@ def test_rows_are_counted_as_an_editor_does_also_below_remarks(tmp_path):
 
 
 def test_a_row_of_units_and_a_time_that_is_none_say_what_to_write(tmp_path):
-    assert "'mm' is a unit; write it into the header" in refused(tmp_path, "t,x,y\n,mm,mm\n0,1,2\n")
+    found = tracks(tmp_path, "t,x,y\n,mm,mm\n" + rows([[t, 1e3 * t, 2e3] for t in TIMES]))
+    np.testing.assert_allclose(found["position"].values[:, 0, 0, 0], TIMES)
+    assert "row 2 holds the units of the columns" in found.attrs["airflock_import"]
+    assert "'mm' is a unit; write it into the header" in refused(tmp_path, "t,x,y\n0,1,2\n,mm,mm\n")
     line = refused(tmp_path, "t,x,y\n04.05.2026 10:00,1,2\n")
     assert "is no time; write seconds, hours:minutes:seconds, or dates" in line
 
@@ -101,7 +104,11 @@ def test_nothing_is_said_of_satellite_time_where_there_is_none(tmp_path):
 
 def test_places_on_one_body_are_no_individuals(tmp_path):
     text = "t,head_x,head_y,tail_x,tail_y\n" + PAIRS
-    assert "no position among" in refused(tmp_path, text)
+    assert "has 2 keypoints (head, tail); choose one: --keypoint head" in refused(tmp_path, text)
+    found = tracks(tmp_path, text, keypoint="tail")
+    assert found.sizes["individual"] == 1
+    np.testing.assert_allclose(found["position"].values[:, :, 0, 0], np.stack(place(TIMES, 2), axis=1))
+    assert "no position among" in refused(tmp_path, "t,goal_x,goal_y\n" + rows([[t, t, t] for t in TIMES]))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ Files = Annotated[
     typer.Argument(
         metavar="FILE...", show_default=False,
         help=".csv, .parquet, .ulg (PX4), .bin and .tlog (ArduPilot), .log (our nodes), .nc and .h5 (movement, "
-        "idtracker.ai), .npy, .npz",
+        "idtracker.ai, SLEAP), .npy, .npz, .mat",
     ),
 ]  # fmt: skip
 Map = Annotated[

@@ -58,7 +58,18 @@ WAIT = 4.0  # time by the clock over that of a processor, for machines that are 
 MOST_HEADER = 200_000_000  # bytes of names and attributes
 SPARE = 4 * 2**30  # bytes of address space besides the arrays: libraries, buffers
 RECORDING = "a netCDF recording"
-FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
+FOREIGN = (
+    ".csv",
+    ".tsv",
+    ".parquet",
+    ".ulg",
+    ".bin",
+    ".tlog",
+    ".npy",
+    ".npz",
+    ".h5",
+    ".mat",
+)  # what airflock import reads
 ENDED_LATE = tuple(-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name))
 START = """import json, sys
 request = json.loads(sys.stdin.readline())
@@ -90,7 +101,19 @@ def read_hdf5_arrays(path: str, max_bytes: int, _: OnShare) -> Contents:
     _refuse_outside(path, max_bytes)
     with h5py.File(path, "r") as file:
         arrays = {name: file[name] for name in file if isinstance(file[name], h5py.Dataset)}
-        return _to_json(file.attrs), {name: (None, {}, array[()]) for name, array in arrays.items()}
+        groups = {"groups": ", ".join(name for name in file if name not in arrays)}
+        return _to_json({**file.attrs, **groups}), {name: (None, {}, array[()]) for name, array in arrays.items()}
+
+
+def read_mat_arrays(path: str, max_bytes: int, _: OnShare) -> Contents:
+    """Read the numbers in a file of MATLAB of the format before 7.3; raise ValueError for what is too large."""
+    from scipy.io import loadmat, whosmat
+
+    shapes = [shape for _, shape, _ in whosmat(path)]
+    if sum(8.0 * math.prod(map(float, shape)) for shape in shapes) > max_bytes:
+        raise ValueError(f"its arrays are too large; there is room for {max_bytes / 1e9:.3g} GB")
+    arrays = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    return {}, {name: (None, {}, value) for name, value in arrays.items() if value.dtype.kind in "fiu"}
 
 
 class ReaderProcess:

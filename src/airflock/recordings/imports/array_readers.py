@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from airflock.recordings.imports import table_columns
+from airflock.recordings.imports.read_tables import choose_keypoint, read_frame
 from airflock.recordings.imports.track import (
     COMMAND_TARGETS,
     POSITION_TARGETS,
@@ -16,7 +18,7 @@ from airflock.recordings.imports.track import (
     ImportOptions,
     ImportReport,
 )
-from airflock.recordings.reader_process import ReaderProcess, read_hdf5_arrays, read_netcdf_arrays
+from airflock.recordings.reader_process import ReaderProcess, read_hdf5_arrays, read_mat_arrays, read_netcdf_arrays
 from airflock.support import RecordingError, collect_errors
 
 # NumPy arrays are never unpickled: a pickle runs code when it is read.
@@ -25,15 +27,26 @@ COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pick
 
 
 def read_array(
-    array: Any, options: ImportOptions, where: str = "array", names: list[str] | None = None, fps: float | None = None
-) -> list[ImportedTrack]:
+    array: Any, options: ImportOptions, where: str = "array", names: list[str] | None = None, fps: float | None = None,
+    findings: ImportReport | None = None,
+) -> list[ImportedTrack]:  # fmt: skip
     """Read tracks of an array (frame, individual, 2 or 3); nan where an individual is absent."""
     values = _numbers(array, where)
     if values.ndim == 2 and values.shape[1] in (2, 3):
         values = values[:, None, :]
     if values.ndim != 3 or values.shape[2] not in (2, 3):
         raise RecordingError(f"{where}: has shape {values.shape}; give (frame, individual, 2 or 3)")
-    rate, scale = options.fps or fps, math.nan
+    if len(values) < values.shape[1] and _smoother_across(values):
+        findings = ImportReport() if findings is None else findings
+        findings.add_error(
+            f"{where}: shape {values.shape} is read as {len(values)} frames of {values.shape[1]} individuals, but "
+            "neighbours along the second axis lie closer than those along the first: individuals first? "
+            f"Exchange the axes: python -c \"import numpy as np; np.save('frames.npy', ARRAY.swapaxes(0, 1))\"",
+            "axes",
+        )
+        findings.raise_errors()
+    rate, scale = options.use("fps") or fps, math.nan
+    options.used.update({"time_unit"} if options.time_unit == "frames" else ())
     errors = [] if rate else [f"{where}: counts frames; say how many a second: --fps 25"]
     with collect_errors(errors):
         scale = table_columns.unit_in_metres("", where, "array", options)
@@ -47,6 +60,12 @@ def read_array(
         name = names[number] if names else str(number + 1)
         found.append(ImportedTrack(name, where, frames / rate, columns, frames))
     return found
+
+
+def _smoother_across(values: Any) -> bool:
+    """Return True if places change less along the second axis than along the first, which should be time."""
+    along, across = (float(np.nanmedian(np.abs(np.diff(values.astype(float), axis=axis)))) for axis in (0, 1))
+    return across < 0.5 * along
 
 
 def _numbers(array: Any, where: str) -> Any:
@@ -73,18 +92,65 @@ def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list
         with open(path, "rb") as file:
             loaded = np.load(file, allow_pickle=False)
             if isinstance(loaded, np.lib.npyio.NpzFile):
-                names = [n for n in loaded.files if n in ("trajectories", "position", "tracks")] or loaded.files[:1]
-                if not names:
+                if not loaded.files:
                     raise RecordingError(f"{path}: is an archive without an array")
-                loaded = loaded[names[0]]
-                if isinstance(loaded, bytes):
-                    raise RecordingError(f"{path}: is an archive of {names[0]}, which is no array; unpack it first")
+                members = {name: loaded[name] for name in loaded.files}
+                strange = [name for name, member in members.items() if isinstance(member, bytes)]
+                if strange:
+                    raise RecordingError(f"{path}: is an archive of {strange[0]}, which is no array; unpack it first")
+                return read_members(members, path, options, findings)
     except (ValueError, OSError, EOFError) as error:
         text = str(error).splitlines()[0]
         if "allow_pickle" in text or "pickle" in text.lower():
             raise RecordingError(_pickled(path)) from error
         raise RecordingError(f"{path}: is not an array of numbers: {text}") from error
-    return read_array(loaded, options, str(path))
+    return read_array(loaded, options, str(path), findings=findings)
+
+
+# What a member of a file of several arrays is called if it holds positions, the likeliest first.
+POSITION_MEMBERS = ("positions", "position", "trajectories", "pos", "xyz", "xy", "tracks", "coordinates", "coords")
+
+
+def read_members(
+    members: dict[str, Any], path: Path, options: ImportOptions, findings: ImportReport
+) -> list[ImportedTrack]:
+    """Read tracks of several arrays by name: that of positions, which is noted, or x and y, which may be columns."""
+    arrays = {name: np.asarray(member) for name, member in members.items() if np.ndim(member)}
+    shown = ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "no array"
+    lower = {name.lower(): array for name, array in arrays.items()}
+    fit = [word for word in POSITION_MEMBERS if word in lower and lower[word].ndim in (2, 3)]
+    columns = {name: array.ravel() for name, array in arrays.items() if array.size == max(array.shape)}
+    meanings = {meaning.target: name for name in columns if (meaning := table_columns.header_meaning(name))}
+    if not fit and {"x", "y"} <= set(meanings):  # as TRex writes an individual
+        count = len(columns[meanings["x"]])
+        table = pd.DataFrame({name: column for name, column in columns.items() if len(column) == count})
+        return read_frame(table, options, findings, str(path), path.stem)
+    axes = [axis for axis in POSITION_TARGETS if axis in lower and lower[axis].ndim == 2]
+    if not fit and axes[:2] == ["x", "y"] and len({lower[axis].shape for axis in axes}) == 1:
+        arrays["positions"], fit = np.stack([lower[axis] for axis in axes], axis=-1), ["positions"]
+    alone = fit or len(arrays) == 1
+    chosen = options.map.get("position") or next((n for n in arrays if not fit or n.lower() == fit[0]), "") * bool(
+        alone
+    )
+    options.used.update({"map position"} if "position" in options.map else ())
+    if chosen not in arrays:
+        why = f"has no array {chosen}" if chosen else "has several arrays, of which none is called positions"
+        raise RecordingError(
+            f"{path}: {why}; it has {shown}; write --map position:=NAME of (frame, individual, 2 or 3)"
+        )
+    if len(arrays) > 1:
+        findings.notes.append(f"{path}: {chosen} is read as positions; it has {shown}; otherwise --map position:=NAME")
+    return read_array(arrays[chosen], options, str(path), findings=findings)
+
+
+def read_mat(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Read tracks of a file of MATLAB: of its own format, or HDF5 since 7.3, whose axes are the other way round."""
+    with path.open("rb") as file:
+        new = b"MATLAB 7.3" in file.read(128)
+    read = read_hdf5_arrays if new else read_mat_arrays
+    plain = ReaderProcess(path, read, "a file of MATLAB").answer()
+    arrays = {str(name): variable.values for name, variable in plain.variables.items()}
+    return read_members({name: a.T if new else a for name, a in arrays.items()}, path, options, findings)
 
 
 def refuse_pickled_arrays(path: Path) -> None:
@@ -106,9 +172,16 @@ def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, finding
 
     file : its arrays and attributes, as `recordings.reader_process` hands them over
     """
+    if "node_names" in file and "tracks" in file:
+        return _read_sleap(file, path, options)
+    if "groups" in file.attrs and not file.variables:
+        raise RecordingError(
+            f"{path}: holds tables of pandas ({file.attrs['groups']}), whose names are pickled; give the CSV that "
+            f"DeepLabCut writes beside it ({path.stem}.csv)"
+        )
     if "trajectories" not in file:
-        shown = ", ".join([str(name) for name in file.variables][:8]) or "nothing"
-        raise RecordingError(f"{path}: has no dataset trajectories, as idtracker.ai writes; it has {shown}")
+        arrays = {str(name): variable.values for name, variable in file.variables.items()}
+        return read_members(arrays, path, options, findings)
     values = file["trajectories"].values
     entries = {**{str(k): v.values[()] for k, v in file.variables.items() if v.shape == ()}, **file.attrs}
     if "identities_labels" in file:
@@ -118,9 +191,22 @@ def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, finding
     if body is not None and np.ndim(body) == 0:
         findings.notes.append(f"{path}: idtracker.ai gives a body length of {float(body):g} px")
     labels = entries.get("identities_labels")
-    given = [] if labels is None else [str(name) for name in np.atleast_1d(labels)]
+    given = [] if labels is None else _texts(labels)
     names = given if len(given) == values.shape[1] else None
-    return read_array(values, options, str(path), names, fps)
+    return read_array(values, options, str(path), names, fps, findings)
+
+
+def _texts(names: Any) -> list[str]:
+    return [name.decode() if isinstance(name, bytes) else str(name) for name in np.atleast_1d(names).tolist()]
+
+
+def _read_sleap(file: xr.Dataset, path: Path, options: ImportOptions) -> list[ImportedTrack]:
+    """Read an analysis file of SLEAP: tracks (individual, axis, keypoint, frame) in pixels."""
+    keypoints = _texts(file["node_names"].values)
+    number = keypoints.index(choose_keypoint(keypoints, options, str(path)))
+    values = file["tracks"].values[:, :, number].transpose(2, 0, 1)
+    given = _texts(file["track_names"].values) if "track_names" in file else []
+    return read_array(values, options, str(path), given if len(given) == values.shape[1] else None)
 
 
 # Datasets of `movement`, and Airflock's own.
@@ -145,7 +231,8 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
     if lacks:
         raise RecordingError(f"{where}: position lacks the dimension{'s' * (len(lacks) > 1)} {', '.join(lacks)}")
     if "keypoint" in found.dims:
-        found = found.sel(keypoint=_keypoint(found, options, where))
+        keypoints = [str(name) for name in found["keypoint"].values]
+        found = found.isel(keypoint=keypoints.index(choose_keypoint(keypoints, options, where)))
     axes = [str(axis) for axis in found["space"].values]
     if axes not in (["x", "y"], ["x", "y", "z"]):
         raise RecordingError(f"{where}: space has the axes {', '.join(axes)}, not x, y or x, y, z")
@@ -180,30 +267,19 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
     return tracks
 
 
-def _keypoint(found: xr.Dataset, options: ImportOptions, where: str) -> Any:
-    names = [str(name) for name in found["keypoint"].values]
-    if options.keypoint:
-        if options.keypoint not in names:
-            raise RecordingError(f"{where}: no keypoint {options.keypoint}; it has {', '.join(names)}")
-        return found["keypoint"].values[names.index(options.keypoint)]
-    if len(names) > 1:
-        raise RecordingError(f"{where}: has {len(names)} keypoints ({', '.join(names[:8])}); choose one: --keypoint")
-    return found["keypoint"].values[0]
-
-
 def _seconds(found: xr.Dataset, options: ImportOptions, where: str) -> Any:
     times = found["time"].values
     if times.dtype.kind in "mM":  # dates and durations of NumPy say themselves what they count
         ticks = times.astype(f"{'timedelta64' if times.dtype.kind == 'm' else 'datetime64'}[us]").astype(np.int64)
         return np.where(np.isnat(times), np.nan, ticks * 1e-6)
     times = times.astype(float)
-    unit = options.time_unit or str(found.attrs.get("time_unit", found["time"].attrs.get("units", "")))
+    unit = options.use("time_unit") or str(found.attrs.get("time_unit", found["time"].attrs.get("units", "")))
     if unit in ("frames", "frame", ""):
-        rate = options.fps or float(found.attrs.get("fps") or 0.0)
+        rate = options.use("fps") or float(found.attrs.get("fps") or 0.0)
         if not rate > 0.0:
             raise RecordingError(f"{where}: counts frames; say how many a second: --fps 25")
         return times / rate
-    factors = {**table_columns.TIME_UNITS, "seconds": 1.0, "second": 1.0, "milliseconds": 1e-3, "microseconds": 1e-6}
+    unit, factors = table_columns.UNIT_WORDS.get(unit, unit), table_columns.TIME_UNITS
     if unit not in factors:
         raise RecordingError(
             f"{where}: {unit}: unknown unit of time; known: {', '.join(table_columns.TIME_UNITS)}, frames"

@@ -31,12 +31,12 @@ def to_ecef(lat: Any, lon: Any, height: Any) -> NDArray[np.float64]:
     return np.stack(np.broadcast_arrays(across * np.cos(lam), across * np.sin(lam), up), axis=-1)
 
 
-def enu_axes(lat: float, lon: float) -> NDArray[np.float64]:
-    """Return unit vectors east, north and up at a place, as rows, in earth-centred coordinates."""
+def enu_axes(lat: Any, lon: Any) -> NDArray[np.float64]:
+    """Return unit vectors east, north and up (3, 3, ...) at places, as rows, in earth-centred coordinates."""
     phi, lam = np.radians(lat), np.radians(lon)
-    east = [-np.sin(lam), np.cos(lam), 0.0]
+    east = [-np.sin(lam), np.cos(lam), lam - lam]
     north = [-np.sin(phi) * np.cos(lam), -np.sin(phi) * np.sin(lam), np.cos(phi)]
-    return np.array([east, north, np.cross(east, north)])
+    return np.array([east, north, np.cross(np.array(east), np.array(north), axis=0)])
 
 
 def to_enu(lat: Any, lon: Any, height: Any, origin: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -63,6 +63,7 @@ def vectors_to_origin(
 
 # Local frame: latitudes and longitudes become metres, and tracks of several frames get one origin.
 DEGREES = {"lat": 90.0, "lon": 360.0}  # the largest that there are
+FAR = 5e4  # m from the origin; beyond, the curvature of the earth is told
 
 
 def to_local_frame(
@@ -80,6 +81,7 @@ def to_local_frame(
     if origin is None and placed:
         origin = placed[0].origin
     wrong: set[str] = set()
+    flat = [track for track in geodetic if "alt" not in track.columns]
     for track in geodetic:
         error = _degrees_error(track)
         if error and track.source not in wrong:
@@ -90,6 +92,16 @@ def to_local_frame(
                 origin = _first_fix(track)
                 findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
             _project(track, origin)
+    far = [track for track in geodetic if "x" in track.columns and _is_far(track)]
+    if far:
+        # In the plane of the origin distances shrink: by 3e-5 at 50 km, to nothing at a quarter of the earth's girth.
+        findings.notes.append(
+            f"{far[0].source}: column {far[0].label('y')}, {far[0].label('x')}, row {far[0].rows[0]} on: {far[0].name} "
+            f"goes farther than {FAR / 1e3:g} km from the origin: z drops with the curvature of the earth, so that "
+            "distances and speeds are those on the ellipsoid; it is no height"
+        )
+    for track in flat if not far else ():
+        track.columns.pop("z", None)
     for track in placed:
         assert origin is not None
         _move(track, origin)
@@ -120,11 +132,21 @@ def _project(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
     """Put local metres about an origin in the place of a track's latitude, longitude and height."""
     lat, lon = track.columns["lat"], track.columns["lon"]
     local = to_enu(lat, lon, track.columns.get("alt", np.zeros(len(lat))), origin)
-    axes = 3 if "alt" in track.columns else 2
     track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC_TARGETS}
-    track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION_TARGETS[:axes])}
+    track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION_TARGETS)}
     track.user_labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
     track.origin = origin
+    if not _is_far(track):
+        return
+    for names in (VELOCITY_TARGETS, COMMAND_TARGETS):  # east and north of the place are not those of the origin
+        if track.has(names):
+            axes = np.moveaxis(enu_axes(lat, lon), -1, 0)
+            turned = np.einsum("ri,rij->rj", track.stack(names, 3), axes) @ enu_axes(*origin[:2]).T
+            track.columns |= {name: turned[:, c] for c, name in enumerate(names)}
+
+
+def _is_far(track: ImportedTrack) -> bool:
+    return bool(np.hypot(track.columns["x"], track.columns["y"]).max(initial=0.0) > FAR)
 
 
 def _move(track: ImportedTrack, origin: tuple[float, float, float]) -> None:

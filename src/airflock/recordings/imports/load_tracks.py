@@ -22,6 +22,7 @@ from airflock.recordings.imports import (
     track_checks,
 )
 from airflock.recordings.imports.common_frame import to_local_frame
+from airflock.recordings.imports.table_columns import quote_column
 from airflock.recordings.imports.track import (
     ACCEPTABLE_ERRORS,
     GEODETIC_TARGETS,
@@ -142,6 +143,7 @@ def load_tracks(
             "no velocity: differentiated from positions, one-sided at both ends of a track and of gaps; axes and units "
             "could not be checked against them"
         )
+    begin, end = (None if moment is None else moment + findings.since for moment in (begin, end))
     times, period = resampling.time_grid(tracks, rate, begin, end)
     sources = sorted({track.source for track in tracks})
     kept, step = resampling.needed_bits(tracks, precision)
@@ -198,26 +200,120 @@ def read_tracks(
     """
     tracks = _read(source, options, findings)
     findings.raise_errors()
+    _refuse_unused(options, findings)
     tracks = track_checks.drop_rejected_rows(tracks, findings)
     tracks = track_checks.drop_incomplete_rows(tracks, findings)
     track_checks.check_columns(tracks, findings)
     track_checks.note_missing_velocities(tracks, findings)
+    for track in tracks:
+        drop_corrupt_times(track, findings)
     track_checks.check_times(tracks, findings)
     track_checks.check_names(tracks, findings)
     track_checks.check_heights(tracks, options.axes, findings)
     to_local_frame(tracks, origin, findings)
+    if origin is not None and not any(track.origin for track in tracks):
+        findings.add_error("--origin: no file has latitudes and longitudes, nor an origin; leave it out")
     findings.raise_errors()
     track_checks.check_axes(tracks, findings)
     findings.raise_errors()
     # Axes first: jumps are judged by velocities, which must belong to the same axes as positions.
     comparable = common_frame.align_clocks(tracks, same_clock, findings)
     if begin is not None or end is not None:
-        tracks = cut_window(tracks, begin, end)
+        first = min(float(track.time[0]) for track in tracks)
+        if first > SINCE_1970 and max(abs(moment) for moment in (begin, end) if moment is not None) < SINCE_1970:
+            findings.since = first
+            findings.notes.append("--begin and --end count from the first row, because times are seconds since 1970")
+        tracks = cut_window(tracks, *(None if moment is None else moment + findings.since for moment in (begin, end)))
     track_checks.check_jumps(tracks, findings)
     for track in tracks:
         track_checks.note_resolution(track, findings)
     findings.raise_errors()
+    for own in track_checks.tracks_by_source(tracks).values():
+        _question_lengths(own, findings)
+    findings.raise_errors()
     return tracks, comparable
+
+
+# Options that are of no use are refused: a rate that is ignored gives speeds that are wrong in silence.
+UNUSED = {
+    "unit": "no length lacks a unit; expressions of --map must give metres",
+    "scale": "nothing is in pixels; write --unit px as well",
+    "time_unit": "no time lacks a unit; expressions of --map must give seconds",
+    "fps": "no time counts frames; if it does, write --time-unit frames as well",
+    "keypoint": "no file has keypoints",
+    "axes": "files and formats that say which axes theirs are, and arrays, are not turned round",
+    "decimal": "no file is a text",
+    "delimiter": "no file is a text",
+}
+
+
+def _refuse_unused(options: ImportOptions, findings: ImportReport) -> None:
+    """Add an error for each option that no file makes use of."""
+    plain = ImportOptions()
+    for name, why in UNUSED.items():
+        value = getattr(options, name)
+        if value != getattr(plain, name) and name not in options.used and value != "enu":
+            findings.errors.append(f"--{name.replace('_', '-')} {value}: of no use: {why}, or leave it out")
+    for target, text in options.map.items():
+        if f"map {target}" not in options.used:
+            findings.errors.append(f"--map {target}:={text}: of no use: no file is read by it; leave it out")
+    findings.raise_errors()
+
+
+def _question_lengths(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Ask whether positions of a file without a unit are degrees, or smaller than metres."""
+    if not all(track.unitless for track in tracks):
+        return
+    speeds, places = [np.empty(0)], []
+    for track in tracks:
+        place, span = track.stack(POSITION_TARGETS, 2), np.diff(track.time)
+        step = np.linalg.norm(np.diff(place, axis=0), axis=1)
+        moved = (step > 0.0) & (span > 0.0)
+        speeds.append(step[moved] / span[moved])
+        places.append(np.abs(place))
+    every, every_speed = np.concatenate(places), np.concatenate(speeds)
+    if len(every_speed) < 5:
+        return
+    x, y = (tracks[0].label(axis) for axis in "xy")
+    far, usual = every.max(axis=0), float(np.median(every_speed))
+    line = (
+        f"{tracks[0].source}: column {x}, {y}, row {tracks[0].rows[0]}: no unit, and rows move by {usual:.3g} a second"
+    )
+    lon, lat = (y, x) if far[1] > 90.0 >= far[0] else (x, y)
+    # A bird makes 1e-4 degrees a second; what moves as little in metres lies about the origin, or stands.
+    degrees = far.max() <= 180.0 and far.min() <= 90.0 and np.median(every) > 1.0
+    if usual < SLOWEST and degrees and not tracks[0].has(VELOCITY_TARGETS):
+        ways = f'--map "lon:={quote_column(lon)}" --map "lat:={quote_column(lat)}"'
+        findings.add_error(
+            f"{line}: degrees? Write {ways}; if they are metres, --unit m; if times are no seconds, for instance "
+            "--time-unit us"
+        )
+    elif usual > FASTEST:
+        findings.add_error(f"{line}: cm or mm? Write --unit cm, or --unit mm; if they are metres, --unit m")
+
+
+def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
+    """Leave out rows whose time lies far off both neighbours, which agree, or years off all others; note the rows."""
+    time = track.time
+    if len(time) < 5:
+        return
+    steps = np.diff(time)
+    usual = float(np.median(np.abs(steps)))
+    between = (time[2:] >= time[:-2]) & ((time[1:-1] < time[:-2]) | (time[1:-1] > time[2:]))
+    off = np.minimum(np.abs(time[1:-1] - time[:-2]), np.abs(time[2:] - time[1:-1]))
+    bad = np.zeros(len(time), bool)
+    bad[1:-1] = between & (off > 20.0 * usual) & (time[2:] - time[:-2] < 20.0 * usual)
+    # A clock that was not set yet: 1970 or 1980 in the first rows.
+    middle = float(np.median(time))
+    spread = float(np.ptp(np.quantile(time, [0.1, 0.9])))
+    bad |= (np.abs(time - middle) > 1e7) & (np.abs(time - middle) > 1e3 * spread)
+    if bad.any() and bad.mean() < 0.1:
+        row = track.rows[bad][0]
+        findings.notes.append(
+            f"{track.source}: column {track.label('t')}: {bad.sum()} rows of {track.name} with a corrupt time left "
+            f"out, first row {row} ({time[bad][0]:.10g} s between rows at about {middle:.10g} s)"
+        )
+        track.keep(~bad)
 
 
 def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:
@@ -241,7 +337,7 @@ def _read(what: Any, options: ImportOptions, findings: ImportReport) -> list[Imp
     if isinstance(what, pd.DataFrame):
         return read_tables.read_frame(what, options, findings)
     if isinstance(what, np.ndarray):
-        return array_readers.read_array(what, options)
+        return array_readers.read_array(what, options, findings=findings)
     if isinstance(what, (str, os.PathLike)):
         what = [what]
     try:
@@ -342,8 +438,11 @@ READERS: dict[str, tuple[str, Reader]] = {
     ".hdf5": ("movement or idtracker.ai HDF5", array_readers.read_netcdf),
     ".npy": ("NumPy array", array_readers.read_npy),
     ".npz": ("NumPy arrays", array_readers.read_npy),
+    ".mat": ("MATLAB arrays", array_readers.read_mat),
 }
 
+SLOWEST, FASTEST = 1e-3, 100.0  # m/s: usual speeds beyond are no metres, where nobody has said so
+SINCE_1970 = 1e8  # s; times beyond count since 1970
 AUTOPILOT_SUFFIXES = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
+from itertools import islice, takewhile, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,18 +21,25 @@ from airflock.recordings.imports.track import (
 from airflock.recordings.imports.track_checks import PLACE_TARGETS
 from airflock.support import RecordingError, trim_heap
 
+SHORT_CLOCK = r"\d+:[0-5]\d"  # hours, minutes; counted so only beside a date
 CLOCK = r"\d+:[0-5]\d:[0-5]\d(\.\d+)?"  # hours, minutes, seconds
 CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drones fits
+DAY = 86400.0  # s
+DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y")
+FIRST_DATE, LAST_DATE = 6.3e8, 4.2e9  # s since 1970: 1990 and 2103
+PoseColumns = dict[str, dict[str, dict[str, str]]]  # individual → keypoint → component → column
 
 
 def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read the tracks of a text table; raise a RecordingError that names column and row."""
     head = read_head(path, options)
-    if head.above:
-        findings.notes.append(f"{path}: line{'s' * (head.above > 1)} above the table left out: {head.above}")
+    findings.notes += [f"{path}: {note}" for note in head.notes]
     size = path.stat().st_size
     text = {"sep": head.delimiter, "decimal": options.decimal, "encoding": head.encoding, "skipinitialspace": True}
-    text |= {"skiprows": head.above, "header": None, "names": head.names} if head.hidden else {"skiprows": head.above}
+    text |= {"header": None, "names": head.names} if head.named else {}
+    text |= {"skiprows": head.above, "index_col": False if head.trailing else None}
+    # A lone hyphen is a missing number, but it may be a name.
+    text["na_values"] = {name: ["-"] for name in head.names if name not in names_of_individuals(head.names, options)}
 
     def parts(columns: list[str] | None) -> Iterator[tuple[int, pd.DataFrame]]:
         at = head.first  # the row after the header, as an editor counts
@@ -49,7 +56,14 @@ def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list
             except (pd.errors.ParserError, UnicodeDecodeError) as error:
                 raise RecordingError(f"{path}: {str(error).splitlines()[0]}") from error
 
-    return tracks_from_parts(str(path), path.stem, head.names, parts, options, findings)
+    return tracks_from_parts(str(path), path.stem, head.names, parts, options, findings, head.pose)
+
+
+def names_of_individuals(columns: list[str], options: ImportOptions) -> list[str]:
+    """Return the columns that may hold names of individuals."""
+    meanings = map(table_columns.header_meaning, columns)
+    named = [column for column, meaning in zip(columns, meanings, strict=True) if meaning and meaning.target == "id"]
+    return [*named, options.map.get("id", "").strip("'\" ")]
 
 
 def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
@@ -87,30 +101,36 @@ def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
     return pd.DataFrame({str(name): lists.get(str(name), value) for name, value in columns.items()})
 
 
-def read_frame(table: pd.DataFrame, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+def read_frame(
+    table: pd.DataFrame,
+    options: ImportOptions,
+    findings: ImportReport,
+    where: str = "DataFrame",
+    stem: str = "individual",
+) -> list[ImportedTrack]:
     """Read the tracks of a pandas DataFrame; a named index is a column, too."""
     flat = table.reset_index() if any(name is not None for name in table.index.names) else table
     flat = flat.set_axis([str(c) for c in flat.columns], axis=1)
-    return tracks_from_parts(
-        "DataFrame", "individual", list(flat.columns), lambda _: iter([(0, flat)]), options, findings
-    )
+    return tracks_from_parts(where, stem, list(flat.columns), lambda _: iter([(0, flat)]), options, findings)
 
 
 def tracks_from_parts(
-    where: str, stem: str, names: list[str], parts: Any, options: ImportOptions, findings: ImportReport
-) -> list[ImportedTrack]:
-    """Read the tracks of a table that comes in parts, by the layout of its columns."""
-    wide = (
-        wide_columns(names)
-        if not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS))
-        else {}
-    )
+    where: str, stem: str, names: list[str], parts: Any, options: ImportOptions, findings: ImportReport,
+    pose: PoseColumns | None = None,
+) -> list[ImportedTrack]:  # fmt: skip
+    """Read the tracks of a table that comes in parts, by the layout of its columns.
+
+    pose : individual → keypoint → component → column, where rows above the table say so
+    """
+    wide: dict[str, dict[str, str]] = {}
+    if not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS)):
+        wide = {} if pose else wide_columns(names)
+        pose = pose or ({} if wide else keypoint_columns(names, stem, options.keypoint))
+    if pose:
+        wide = _of_keypoint(pose, where, options)
     how = column_layout(where, first_individual_columns(names, wide) if wide else names, options)
     findings.notes += how.notes
     _choose_id(where, how, parts, findings)
-    timed = {
-        table_columns.single_column(how.expressions[target]) for target in ("t", "utc") if target in how.expressions
-    }
     gathered: dict[str, list[Any]] = {}
     nameless: list[Any] = [np.empty(0, int)]
     columns = None if wide else how.used
@@ -119,8 +139,8 @@ def tracks_from_parts(
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
         for name, piece in split_by_individual(part, wide, how, stem):
-            read = [c for c in how.used if c != how.id and c not in how.flags]
-            numbers = {c: _numbers(piece[c], where, c, at, time=c in timed) for c in read}
+            read = [c for c in how.used if c not in (how.id, how.date, *how.flags)]
+            numbers = {c: _numbers(piece, c, how, at) for c in read}
             values = how.values(numbers, len(piece)) | {f"flag {c}": _flag_values(piece[c]) for c in how.flags}
             whole = np.all([np.isfinite(values[c]) for c in PLACE_TARGETS if c in values], axis=0)
             whole &= np.isfinite(values["t" if "t" in values else "utc"])
@@ -131,32 +151,42 @@ def tracks_from_parts(
             else:
                 gathered.setdefault(name, []).append(_taken(values, rows, None))
     if not gathered:
-        raise RecordingError(f"{where}: has no rows")
+        unnamed = f"no name in column {how.id}; write --map id:=file" if sum(map(len, nameless)) else "no rows"
+        raise RecordingError(f"{where}: has {unnamed}")
+    _unit_of_dates(how, gathered, findings)
     lost = np.unique(np.concatenate(nameless))
     if len(lost):
         findings.notes.append(f"{where}: {len(lost)} rows without an id left out, first row {lost[0]}")
     tracks = []
     for name in list(gathered):
         tracks.append(_track(name, where, gathered.pop(name), how, bool(how.id or wide), findings))
+    if how.clocks:
+        late = [_pass_midnight(track) for track in tracks]
+        findings.notes += [f"{where}: column {how.clocks[0]}, row {row} goes back by more than 12 h: taken as midnight"
+                           for row in late if row][:1]  # fmt: skip
     trim_heap()
     return tracks
 
 
-def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
-    """Return a column as float64: dates as seconds since 1970, durations as seconds; raise RecordingError for other
-    texts.
+def _numbers(piece: pd.DataFrame, name: str, how: ColumnLayout, at: int) -> Any:
+    """Return a column as float64; raise RecordingError for the first text in it that is no number.
 
-    time : True for times, which may be written as dates or as hours:minutes:seconds
+    Dates become seconds since 1970, durations seconds. Times may also be texts: dates, or hours:minutes:seconds, to
+    which a date in another column is added.
     """
+    column, time = piece[name], name in how.times
     if pd.api.types.is_numeric_dtype(column):
+        if time and how.date and name == how.user_labels.get("t") and piece[how.date].nunique() > 1:
+            raise RecordingError(
+                f"{how.where}: column {how.date}, row {at} on, holds several dates beside column {name}, whose numbers "
+                f"are no times of day; write one column (2026-05-04T10:00:00), or --map t:={name}*1 if it counts on"
+            )
         return column.to_numpy(float, na_value=np.nan)
     if pd.api.types.is_datetime64_any_dtype(column):
         return _since_1970(column)
     if pd.api.types.is_timedelta64_dtype(column):
         return column.dt.total_seconds().to_numpy(float)
-    found = pd.to_numeric(column, errors="coerce")
-    text = column.astype(str).str.strip()
-    given = column.notna() & (text != "")
+    found, text, given = pd.to_numeric(column, errors="coerce"), *_texts(column)
     bad = np.flatnonzero((found.isna() & given).to_numpy())
     if not bad.size:
         return found.to_numpy(float, na_value=np.nan)
@@ -164,9 +194,66 @@ def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
         when = pd.to_datetime(column, errors="coerce", utc=True, format="ISO8601")
         if not (when.isna() & given).any():
             return _since_1970(when)
+        text = text.where(~text.str.fullmatch(SHORT_CLOCK) | (how.date == ""), text + ":00")
         if text[given].str.fullmatch(CLOCK).all():
-            return pd.to_timedelta(text.where(given)).dt.total_seconds().to_numpy(float)
-    raise RecordingError(f"{where}: column {name}, row {at + bad[0]}: {_no_number(str(column.iloc[bad[0]]), time)}")
+            how.clocks += [] if how.date else [name]
+            days = _days(piece[how.date], how, at) if how.date else 0.0
+            return pd.to_timedelta(text.where(given)).dt.total_seconds().to_numpy(float) + days
+    raise RecordingError(f"{how.where}: column {name}, row {at + bad[0]}: {_no_number(str(column.iloc[bad[0]]), time)}")
+
+
+def _texts(column: Any) -> tuple[Any, Any]:
+    """Return a column as texts, and the rows in which something stands."""
+    text = column.astype(str).str.strip()
+    return text, column.notna() & (text != "")
+
+
+def _days(column: Any, how: ColumnLayout, at: int) -> Any:
+    """Return the midnights of dates, s since 1970; raise RecordingError for other texts, and for 04/05/2026."""
+    if pd.api.types.is_datetime64_any_dtype(column):
+        return _since_1970(column.dt.normalize())
+    text, given = _texts(column)
+    read = [pd.to_datetime(text.where(given), format=form, errors="coerce") for form in DATES]
+    whole = [when for when in read if not (when.isna() & given).any()]
+    other = [~when.eq(whole[0]) & given for when in whole[1:]] if whole else [read[0].isna() & given]
+    bad = np.flatnonzero(np.any(other, axis=0)) if other else np.empty(0, int)
+    if bad.size:
+        why = "may have the day or the month first" if whole else "is no date"
+        raise RecordingError(
+            f"{how.where}: column {how.date}, row {at + bad[0]}: {text.iloc[bad[0]]} {why}; write dates as 2026-05-04"
+        )
+    return _since_1970(whole[0])
+
+
+def _unit_of_dates(how: ColumnLayout, gathered: dict[str, list[Any]], findings: ImportReport) -> None:
+    """Convert times without a unit that can only be milli-, micro- or nanoseconds since 1970; note what was assumed."""
+    for target in {"t", "utc"} & set(how.unitless):
+        pieces = [piece[0] for parts in gathered.values() for piece in parts]
+        ticks = pieces[0][target][np.isfinite(pieces[0][target])]
+        usual, row = float(np.median(ticks)) if len(ticks) else 0.0, next(iter(gathered.values()))[0][1][0]
+        fits = [(unit, factor) for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+                if FIRST_DATE <= usual * factor <= LAST_DATE]  # fmt: skip
+        if not fits and usual <= 1e11:
+            continue
+        line = f"{how.where}: column {how.user_labels[target]}, row {row}: {usual:.6g} has no unit"
+        unit, factor = fits[0] if fits else ("s", 1.0)
+        step = factor * float(np.median(np.abs(np.diff(ticks)))) if len(ticks) > 1 else 0.0
+        # Hours from row to row are fixes of animals on the earth; in a local frame it is a clock with finer ticks.
+        if not fits or (step > 3600.0 and "lat" not in how.expressions):
+            reason = f"as {unit} since 1970 it is no date of ours, or rows are {step:.3g} s apart"
+            raise RecordingError(f"{line}; {reason}; write --time-unit ms, us or ns")
+        others = " or ".join(other for other in ("s", "ms", "us", "ns") if other != unit)
+        date = np.datetime64(int(usual * factor), "s").item()
+        findings.notes.append(f"{line}: taken as {unit} since 1970 ({date:%Y-%m-%d}); if not, --time-unit {others}")
+        for piece in pieces:
+            piece[target] *= factor
+
+
+def _pass_midnight(track: ImportedTrack) -> int:
+    """Add a day wherever times of day go back by more than half of one; return the first such row, or 0."""
+    back = np.diff(track.time, prepend=track.time[:1]) < -0.5 * DAY
+    track.time = track.time + DAY * np.cumsum(back)
+    return int(track.rows[back.argmax()]) if back.any() else 0
 
 
 def _no_number(text: str, time: bool) -> str:
@@ -274,6 +361,7 @@ def _track(
     found = ImportedTrack(name, where, time, columns, rows, dict(how.user_labels), clock, pair, how.datum)
     found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
     found.in_air, found.ground, found.flags, found.fixed_units = air, how.ground, flags, how.fixed_units
+    found.unitless = {"x", "y"} <= set(how.unitless)
     return found
 
 
@@ -281,6 +369,7 @@ def _track(
 DELIMITERS = (",", ";", "\t", "|")
 BLANKS = r"\s+"  # where nothing else separates columns, as NumPy writes tables
 MOST = 1 << 20  # bytes that are looked at
+MOST_ABOVE = 60  # lines above a table
 REMARK = "#"  # begins a line above a table
 SEPARATOR = re.compile(r'"?sep=.?"?', re.IGNORECASE)  # such a line, which spreadsheets write and read
 
@@ -288,44 +377,106 @@ SEPARATOR = re.compile(r'"?sep=.?"?', re.IGNORECASE)  # such a line, which sprea
 class TableHead(NamedTuple):
     """The beginning of a text table.
 
-    above  : number of lines above it; first : number of its first row of data, as an editor counts
-    hidden : whether the names stand in the last line above it, as NumPy writes them
+    above    : number of lines above its names, or above its first row where the names do not stand in one line above it
+    named    : whether `names` stand in no such line: NumPy writes them in a remark, trackers in several lines
+    trailing : whether rows end with a delimiter, and the names do not
+    pose     : individual → keypoint → component → column, of DeepLabCut
     """
 
     encoding: str
     delimiter: str
     names: list[str]
     above: int
-    hidden: bool
+    named: bool
+    trailing: bool
+    pose: PoseColumns
+    notes: list[str]
 
     @property
     def first(self) -> int:
         """Return the number of the first row of data, as an editor counts."""
-        return self.above + (1 if self.hidden else 2)
+        return self.above + (1 if self.named else 2)
 
 
 def read_head(path: Path, options: ImportOptions) -> TableHead:
     """Read the beginning of a text table; raise RecordingError for other files, and for columns without names."""
     encoding, lines = _lines(path)
-    above = next((i for i, line in enumerate(lines) if line.strip() and not _remark(line)), len(lines))
+    given = {"tab": "\t", "\\t": "\t"}.get(options.use("delimiter"), options.delimiter)
+    above = _line_of_names(lines, given, options)
     if above == len(lines):
         raise RecordingError(f"{path}: has no rows")
     body = [line for line in islice(lines, above + 1, above + 20) if line.strip()]
-    given = {"tab": "\t", "\\t": "\t"}.get(options.delimiter, options.delimiter)
     delimiter = given or _delimiter(lines[above], body)
-    names = _cells(lines[above], delimiter)
+    names = [name or f"column {k}" for k, name in enumerate(_cells(lines[above], delimiter), 1)]
     if len(names) > MAX_COLUMNS:
         column_layout(str(path), names, options)
+    notes = [f"line{'s' * (above > 1)} above the table left out: {above}"] if above else []
     # Some trackers write the names in a comment above the numbers; they are used if their count
     # fits.
-    hidden = False
+    first, pose = above + 1, PoseColumns()
     if all(_numeric(name) for name in names):
         over = _cells(lines[above - 1].strip().lstrip(REMARK), delimiter) if above else []
         if len(over) != len(names) or any(_numeric(name) for name in over):
             raise RecordingError(f"{path}: the first row holds numbers; add a row of names, for instance t,id,x,y")
-        body, names, hidden = [lines[above], *body], over, True
-    _decimals(path, body, len(names), delimiter, options, above + (1 if hidden else 2))
-    return TableHead(encoding, delimiter, names, above, hidden)
+        first, names = above, over
+    elif names[0].lower() == "scorer":
+        first, names, pose = _pose_names(path, lines, above, delimiter)
+        body = lines[first : first + 20]
+    else:
+        count = _rows_of_units(body, delimiter)
+        if count:
+            units = _cells(body[count - 1], delimiter)
+            names = [f"{name} [{unit.strip('()[]')}]" if table_columns.is_unit(unit) else name
+                     for name, unit in zip_longest(names, units[: len(names)], fillvalue="")]  # fmt: skip
+            notes.append(f"row {above + 1 + count} holds the units of the columns")
+            first, body = above + 1 + count, body[count:]
+    named = first != above + 1 or bool(pose)
+    start = first if named else above
+    _decimals(path, body, len(names), delimiter, options, first + 1)
+    # Rows that end with a delimiter would otherwise be read as one column to the left.
+    cells = [_cells(line, delimiter) for line in body if '"' not in line]
+    trailing = bool(cells) and all(len(row) > len(names) and not any(row[len(names) :]) for row in cells)
+    return TableHead(encoding, delimiter, names, start, named, trailing, pose, notes)
+
+
+def _line_of_names(lines: list[str], delimiter: str, options: ImportOptions) -> int:
+    """Return the first line that names a time and a position, or whatever --map reads; else the first line of all."""
+    first = next((i for i, line in enumerate(lines) if line.strip() and not _remark(line)), len(lines))
+    words = re.compile(r"[^\W\d]\w*")
+    mapped = {word for text in options.map.values() if text != "file" for word in words.findall(text)}
+    for i in range(first, min(first + MOST_ABOVE, len(lines))):
+        names = _cells(lines[i], delimiter or _delimiter(lines[i], lines[i + 1 : i + 2]))
+        targets = {meaning.target for meaning in map(table_columns.header_meaning, names) if meaning}
+        places = targets & {"x", "lat"} or set(wide_columns(names))
+        if (targets & {"t", "utc", "frame"} and places) or (mapped and mapped <= set(words.findall(lines[i]))):
+            return i
+    counted = re.match(r'"?Number of header lines:"?[;,\t]"?(\d+)', "".join(lines[first : first + 1]))
+    return (
+        min(int(counted[1]) - 2, len(lines)) if counted else first
+    )  # of EthoVision, whose last two are names and units
+
+
+def _rows_of_units(body: list[str], delimiter: str) -> int:
+    """Return how many rows under the names hold words and, last, units; 0 where there are no units."""
+    rows = [_cells(line, delimiter) for line in body[:4]]
+    words = list(takewhile(lambda row: not any(re.match(r"[-+.]?\d", cell) for cell in row), rows))
+    return len(words) if words and any(map(table_columns.is_unit, words[-1])) else 0
+
+
+def _pose_names(path: Path, lines: list[str], above: int, delimiter: str) -> tuple[int, list[str], PoseColumns]:
+    """Return the first row of a table of DeepLabCut, unique names of its columns, and what they hold."""
+    rows = {cells[0].lower(): cells[1:] for line in lines[above : above + 4] if (cells := _cells(line, delimiter))}
+    if not {"bodyparts", "coords"} <= set(rows):
+        raise RecordingError(
+            f"{path}: row {above + 1}: scorer without rows bodyparts and coords below it; save it again"
+        )
+    individuals = rows.get("individuals", [path.stem] * len(rows["coords"]))
+    pose: PoseColumns = {}
+    names = ["frame"]
+    for individual, keypoint, part in zip(individuals, rows["bodyparts"], rows["coords"], strict=True):
+        names.append(f"{individual} {keypoint} {part}")
+        pose.setdefault(individual, {}).setdefault(keypoint, {})[part] = names[-1]
+    return above + 3 + ("individuals" in rows), names, pose
 
 
 def _lines(path: Path) -> tuple[str, list[str]]:
@@ -370,7 +521,11 @@ def _numeric(text: str) -> bool:
 
 def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: ImportOptions, at: int) -> None:
     """Refuse decimal commas that nobody has announced; at: number of the first row."""
-    if options.decimal != ".":
+    if options.use("decimal") != ".":
+        cells = [cell.strip(' "') for line in body for cell in _cells(line, delimiter)]
+        points = [cell for cell in cells if re.fullmatch(r"[-+]?\d+\.\d+", cell)]
+        if points and not any(re.fullmatch(r"[-+]?\d+,\d+", cell) for cell in cells):
+            raise RecordingError(f"{path}: row {at}: {points[0]} has a decimal point; leave --decimal , out")
         return
     # A decimal comma beside a comma as delimiter cannot be read: the cells of a row are then too
     # many.
@@ -379,12 +534,14 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
         comma = [cell.strip() for cell in cells if re.fullmatch(r'\s*"?[-+]?\d+,\d+"?\s*', cell)]
         if delimiter != "," and comma:
             raise RecordingError(f"{path}: row {number}: {comma[0]} has a decimal comma; write --decimal ,")
-        if delimiter == "," and '"' not in line and len(cells) > count:
+        if delimiter == "," and '"' not in line and any(cell.strip() for cell in cells[count:]):
             raise RecordingError(
                 f"{path}: row {number} has {len(cells)} cells, the header {count}; if the numbers have decimal commas, "
                 "save the table with ; between its columns and write --decimal ,"
             )
 
+
+KEYPOINT = re.compile(r"(.+)_([xyz])")
 
 # Wide tables: columns for each individual, as x1, y1, x2, y2 or fish1_x, fish1_y, fish2_x, fish2_y.
 AXIS_FIRST = re.compile(r"([xyz])_?(\d+)")
@@ -395,15 +552,49 @@ def wide_columns(names: list[str]) -> dict[str, dict[str, str]]:
     """Return individual → component → column, of a table such as time, x1, y1, x2, y2; empty for a long table."""
     found: dict[str, dict[str, str]] = {}
     plain = [table_columns.split_header(name)[0] for name in names]
+    numbered = any(name in table_columns.ALIASES["id"] for name in plain)  # then leg1_x, leg2_x are keypoints
     if any(name in table_columns.ALIASES["x"] for name in plain):
         return found
     for name, text in zip(names, plain, strict=True):
         first, second = AXIS_FIRST.fullmatch(text), NAME_FIRST.fullmatch(text)
         if first:
             found.setdefault(first[2], {})[first[1]] = name
-        elif second:
+        elif second and not numbered:
             found.setdefault(second[1], {})[second[2]] = name
     return found if found and all({"x", "y"} <= set(parts) for parts in found.values()) else {}
+
+
+def keypoint_columns(names: list[str], stem: str, keypoint: str) -> PoseColumns:
+    """Return places on one body, as head.x and head.y of SLEAP, of a table without other positions; else empty."""
+    plain = [table_columns.split_header(name)[0] for name in names]
+    meanings = [table_columns.header_meaning(name) for name in names]
+    if {meaning.target for meaning in meanings if meaning} & {*POSITION_TARGETS, *GEODETIC_TARGETS}:
+        return {}
+    found: dict[str, dict[str, str]] = {}
+    for name, text in zip(names, plain, strict=True):
+        if match := KEYPOINT.fullmatch(text):
+            found.setdefault(match[1], {})[match[2]] = name
+    whole = {keypoint: parts for keypoint, parts in found.items() if {"x", "y"} <= set(parts)}
+    # One pair such as goal_x and goal_y holds no positions unless somebody says so.
+    return {stem: whole} if len(whole) > 1 or set(whole) == {keypoint} else {}
+
+
+def choose_keypoint(names: list[str], options: ImportOptions, where: str) -> str:
+    """Return the keypoint that the user chose, or the only one; raise RecordingError with those that there are."""
+    chosen = options.use("keypoint") or (names[0] if len(names) == 1 else "")
+    if chosen not in names:
+        shown = ", ".join(names[:8])
+        if chosen:
+            raise RecordingError(f"{where}: no keypoint {chosen}; it has {shown}")
+        raise RecordingError(f"{where}: has {len(names)} keypoints ({shown}); choose one: --keypoint {names[0]}")
+    return chosen
+
+
+def _of_keypoint(pose: PoseColumns, where: str, options: ImportOptions) -> dict[str, dict[str, str]]:
+    """Return individual → component → column of the keypoint that the user chose, or of the only one."""
+    keypoints = list(dict.fromkeys(keypoint for parts in pose.values() for keypoint in parts))
+    chosen = choose_keypoint(keypoints, options, where)
+    return {individual: parts[chosen] for individual, parts in pose.items() if chosen in parts}
 
 
 def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) -> list[str]:
@@ -423,6 +614,7 @@ def split_by_individual(
     taken = [column for parts in wide.values() for column in parts.values()]
     rest = table.drop(columns=taken)
     axes = {layout.user_labels[axis]: axis for axis in POSITION_TARGETS if axis in layout.user_labels}
+    axes |= {part: part for part in next(iter(wide.values())) if part not in POSITION_TARGETS}  # such as a likelihood
     return (
         (number, rest.assign(**{label: table[parts[axis]] for label, axis in axes.items() if axis in parts}))
         for number, parts in wide.items()

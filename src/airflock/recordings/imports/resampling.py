@@ -14,6 +14,7 @@ from airflock.support import RecordingError, trim_heap
 MOST = 2_000_000_000  # numbers of one recording
 NORMAL = 1.5  # times the usual step: longer is a gap
 NTSC = 1.001  # colour television is slower than its nominal rate by this factor (SMPTE 170M)
+SLOWEST_CAMERA = 1.0  # s between frames; slower rows are fixes, which are minutes apart and no rates of television
 SAME_RATE = 2e-5  # relative: times in whole microseconds, at 30 Hz, are 1e-5 off
 FARTHEST = 1e9  # m from the origin; our choice: no animal and no drone has been there
 COARSE = 0.01  # m; where places are farther apart in single precision, they are kept in double
@@ -60,6 +61,8 @@ def _round(period: float) -> float:
 
     Frames of a video are met then, rather than drifted past: with 0.03333 s one is lost in each 10,000 of 30 Hz.
     """
+    if period > SLOWEST_CAMERA:
+        return float(f"{period:.6g}")
     rates = [float(f"{slower / period:.4g}") / slower for slower in (1.0, NTSC)]
     rate = min(rates, key=lambda rate: abs(rate * period - 1.0))
     return 1.0 / rate if abs(rate * period - 1.0) < SAME_RATE else float(f"{period:.4g}")

@@ -21,13 +21,34 @@ from airflock.recordings.imports.track import (
 from airflock.support import RecordingError, collect_errors, suggest
 
 # Headers: the quantity in a column, and its unit.
-LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
-TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
+TIME_UNITS = {
+    "s": 1.0,
+    "sec": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+    "h": 3600.0,
+    "cs": 0.01,
+}
 SPEED_UNITS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3, "km/h": 1 / 3.6, "kmh": 1 / 3.6,
-          "kn": 1852.0 / 3600.0, "kt": 1852.0 / 3600.0, "ft/s": 0.3048}  # fmt: skip
+          "kn": 1852.0 / 3600.0, "kt": 1852.0 / 3600.0, "ft/s": 0.3048, "mph": 0.44704}  # fmt: skip
 OTHER_COMMAND_UNITS = ("1", "m/s^2")  # units of commands that are headings or accelerations
 ANGLES = {"deg": 1.0, "°": 1.0, "degrees": 1.0}
 PIXEL_UNITS = ("px", "pixel", "pixels")
+FRAME_UNITS = ("frame", "frames")
+SPELLINGS = (  # of units, after the unit itself
+    "m metre metres meter meters", "cm centimetre centimetres centimeter centimeters",
+    "mm millimetre millimetres millimeter millimeters", "km kilometre kilometres kilometer kilometers",
+    "um micron microns µm μm micrometer micrometers micrometre micrometres", "ft foot feet", "in inch inches",
+    "s second seconds secs", "cs centisec centisecond centiseconds csec", "min minute minutes mins", "h hour hours hr",
+    "ms msec msecs millis millisec millisecond milliseconds", "us usec μs micros microsec microsecond microseconds",
+    "ns nsec nanosec nanosecond nanoseconds", "m/s m/sec m_s ms-1 m.s-1 meters/s metres/s", "cm/s cm/sec cm_s",
+    "mm/s mm/sec", "ft/s ft/sec", "km/h kph kmph km/hr km_h", "kt kts knot knots", "mph mi/h",
+)  # fmt: skip
+UNIT_WORDS = {word: line.split()[0] for line in SPELLINGS for word in line.split()[1:]}
 UNIT_HINT = "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # for a length without a unit
 
 _EAST, _NORTH, _UP = ("x", "e", "east"), ("y", "n", "north"), ("z", "u", "up")
@@ -43,6 +64,15 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "utc": ("utc", "utc_time", "unix", "unix_time", "gps_time"),
     "air": ("air", "in_air", "flying", "armed"),
 }  # fmt: skip
+# Words of single programs: EthoVision, TrackMate, TRex, NetLogo and the client of the Crazyflie. They count only
+# where no column has a plain word for the same quantity.
+PROGRAM_WORDS: dict[str, str] = {
+    "trial_time": "t", "recording_time": "t", "position_t": "t", "[step]": "frame", "ticks": "frame", "who": "id",
+    **{f"{axis}{end}": axis for axis in "xy" for end in ("_center", "_wcentroid", "cor")},
+    **{f"stateestimate_{name}": name for name in (*POSITION_TARGETS, *VELOCITY_TARGETS)},
+    **{f"kalman_state{name}": name for name in POSITION_TARGETS},
+}  # fmt: skip
+DATE_WORDS = ("date", "utc_date", "gps_date", "local_date", "datum")  # of a column of days beside one of times
 for _axis, (_place, _speed, _wish, _words) in enumerate(
     zip(POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS, (_EAST, _NORTH, _UP), strict=True)
 ):
@@ -56,8 +86,9 @@ DOWN = {"down": "z", "pos_d": "z", "pos_down": "z", "position_down": "z", "vd": 
         "pd": "z", "cmd_d": "cz", "cmd_vd": "cz", "cmd_down": "cz"}  # fmt: skip
 DATUMS = {"height_above_msl": "amsl", "amsl": "amsl", "height_above_ellipsoid": "ellipsoid", "relative_alt": "home",
           "agl": "ground"}  # fmt: skip
-_TARGET = {alias: target for target, known in ALIASES.items() for alias in known}
-_SUFFIXES = sorted({*LENGTH_UNITS, *TIME_UNITS, *SPEED_UNITS, *ANGLES, *PIXEL_UNITS}, key=len, reverse=True)
+_TARGET = {**PROGRAM_WORDS, **{alias: target for target, known in ALIASES.items() for alias in known}}
+ALL_UNITS = {*LENGTH_UNITS, *TIME_UNITS, *SPEED_UNITS, *ANGLES, *PIXEL_UNITS, *UNIT_WORDS}
+_SUFFIXES = sorted(ALL_UNITS, key=len, reverse=True)
 
 
 class HeaderMeaning(NamedTuple):
@@ -74,7 +105,8 @@ def split_header(header: str) -> tuple[str, str]:
     text = header.strip()
     found = re.fullmatch(r"(.+?)\s*[\[(]([^\])]*)[\])]", text)
     if found:
-        return _plain(found[1]), found[2].strip().lower()
+        unit = found[2].strip().lower()
+        return _plain(found[1]), UNIT_WORDS.get(unit, unit)
     plain = _plain(text)
     if plain == "timeus":  # as ArduPilot writes it
         return "time", "us"
@@ -82,18 +114,17 @@ def split_header(header: str) -> tuple[str, str]:
     if plain not in _TARGET:
         for unit in _SUFFIXES:
             if plain.endswith(f"_{unit}") and len(plain) > len(unit) + 1:
-                return plain[: -len(unit) - 1], unit
+                return plain[: -len(unit) - 1], UNIT_WORDS.get(unit, unit)
     return plain, ""
 
 
 def is_unit(text: str) -> bool:
     """Return True if a text is nothing but a unit, also in brackets."""
-    plain = text.strip().strip("[]()").strip().lower()
-    return plain in {*LENGTH_UNITS, *TIME_UNITS, *SPEED_UNITS, *ANGLES, *PIXEL_UNITS}
+    return text.strip().strip("[]()").strip().lower() in {*ALL_UNITS, *FRAME_UNITS}
 
 
 def _plain(text: str) -> str:
-    return re.sub(r"[\s.\-:]+", "_", text.strip().lower())
+    return re.sub(r"[\s.\-:#]+", "_", text.strip().lower())
 
 
 def header_meaning(header: str) -> HeaderMeaning | None:
@@ -121,20 +152,30 @@ def column_factor(target: str, unit: str, where: str, options: ImportOptions) ->
         )
     if not kind or target in GEODETIC_TARGETS[:2]:
         return 1.0
-    if not unit and target in ("t", "utc"):
-        unit = options.time_unit if options.time_unit != "frames" else ""
-    if not unit and target in POSITION_TARGETS:
-        unit = options.unit
+    # An option is of use where the header has no unit, or the same one.
+    option = "time_unit" if target in ("t", "utc") else "unit"
+    if unit in ("", getattr(options, option)) and options.time_unit != "frames":
+        unit = options.use(option) if option == "time_unit" or target in (*POSITION_TARGETS, "alt") else unit
     # A length unit on the command line means the same unit per second for velocities.
     if not unit and target in (*VELOCITY_TARGETS, *COMMAND_TARGETS) and options.unit not in ("", *PIXEL_UNITS):
-        return LENGTH_UNITS[options.unit]
+        return LENGTH_UNITS[options.use("unit")]
     if unit in PIXEL_UNITS and target in POSITION_TARGETS:
         if options.scale is None:
             raise RecordingError(f"{where}: {target} is in pixels; say how many metres one is: --scale 0.0005")
-        return options.scale
+        return float(options.use("scale"))
+    if unit in FRAME_UNITS and target == "t":
+        return frame_length(where, options)
     if unit and unit not in kind:
         raise RecordingError(f"{where}: {unit}: unknown unit of {target}; known: {', '.join(kind)}")
     return kind[unit] if unit else 1.0
+
+
+def frame_length(where: str, options: ImportOptions) -> float:
+    """Return the time between two frames, s; raise RecordingError if nobody has given their rate."""
+    if options.fps is None:
+        raise RecordingError(f"{where} counts frames; say how many a second: --fps 25")
+    options.used.update({"time_unit"} if options.time_unit == "frames" else ())
+    return 1.0 / float(options.use("fps"))
 
 
 def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) -> float:
@@ -142,7 +183,8 @@ def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) 
 
     unit : that of the file, if any; where, what : file and variable, for the message
     """
-    if options.unit or unit in LENGTH_UNITS or unit in PIXEL_UNITS:
+    unit = UNIT_WORDS.get(unit, unit)
+    if options.use("unit") or unit in LENGTH_UNITS or unit in PIXEL_UNITS:
         return column_factor("x", options.unit or unit, where, options)
     raise RecordingError(f"{where}: {subject} has no unit; {UNIT_HINT}")
 
@@ -153,6 +195,7 @@ FIELDS = {"timestamp", *POSITION_TARGETS, *VELOCITY_TARGETS}
 # fields of vehicle_local_position that no other table has; source: PX4,
 # msg/VehicleLocalPosition.msg
 MARKS = {"ref_timestamp", "xy_valid", "z_valid", "v_xy_valid", "xy_reset_counter", "vxy_reset_counter", "z_deriv"}
+CRAZYFLIE = ("stateestimate_x", "kalman_statex")  # fields of its logs, whose times are milliseconds
 ORIGIN = ("ref_lat", "ref_lon", "ref_alt")
 VALID = ("xy_valid", "v_xy_valid")
 
@@ -183,6 +226,9 @@ def px4_options(where: str, columns: Sequence[str], options: ImportOptions) -> t
     Raises RecordingError where they may be those of PX4 and nobody has said which axes they are.
     """
     names = {split_header(column)[0]: split_header(column)[1] for column in columns}
+    if not options.time_unit and names.get("timestamp") == "" and any(name in CRAZYFLIE for name in names):
+        note = f"{where}: column timestamp: fields of the Crazyflie: times in ms; if not, write --time-unit us"
+        return replace(options, time_unit="ms"), [note]
     if not set(names) >= FIELDS or set(options.map) & {*POSITION_TARGETS, *VELOCITY_TARGETS}:
         return options, []
     micro = "us" in (options.time_unit, names["timestamp"]) or "timestamp" in options.map.get("t", "")
@@ -292,13 +338,27 @@ def evaluate(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
 
 
 def quote_column(column: str) -> str:
-    """Return a column as it is written in an expression of --map."""
-    return column if column.isidentifier() else f"'{column}'"
+    """Return a column, or an expression in parentheses, as it is written in an expression of --map."""
+    return column if column.isidentifier() or column.startswith("(") else f"'{column}'"
+
+
+def quote_names(text: str, columns: Sequence[str]) -> str:
+    """Put quotes round columns whose names have hyphens, dots or blanks; a text that is one column is that column."""
+    if text.strip() in columns:
+        return repr(text.strip())
+    # Longest first, so that a name that begins another one does not cut it; what stands in quotes stays.
+    odd = sorted((name for name in columns if name and not name.isidentifier()), key=len, reverse=True)
+    names = "|".join(map(re.escape, odd)) or "(?!)"
+    return re.sub(
+        rf"""('[^']*'|"[^"]*")|(?<![\w.])({names})(?![\w.])""",
+        lambda match: match[1] or repr(match[2]),
+        text,
+    )
 
 
 # Layout: the column of each quantity, by --map or by the headers; and the values in SI units.
 MAX_COLUMNS = 2000
-OF_A_TRACKER = ("probability", "likelihood", "score", "confidence")
+OF_A_TRACKER = ("probability", "likelihood", "score", "confidence", "wcentroid")
 
 
 @dataclass
@@ -312,6 +372,9 @@ class ColumnLayout:
     id: str = ""  # a column, or "" where the whole file is one individual
     datum: str = ""
     ground: bool = False  # whether its axes are known to point east and north
+    date: str = ""  # a column of days beside times of day
+    clocks: list[str] = field(default_factory=list)  # columns of times of day without a date
+    unitless: list[str] = field(default_factory=list)  # targets whose unit nobody has named
     notes: list[str] = field(default_factory=list)
     fixed_units: bool = False  # of PX4's fields
     ids: list[str] = field(default_factory=list)  # all columns of names, if none is mapped
@@ -321,7 +384,12 @@ class ColumnLayout:
     def used(self) -> list[str]:
         """Return the columns that are needed."""
         found = [name for tree in self.expressions.values() for name in column_names(tree)]
-        return list(dict.fromkeys(found + ([self.id] if self.id else []) + [*self.flags]))
+        return list(dict.fromkeys(found + [name for name in (self.id, self.date, *self.flags) if name]))
+
+    @property
+    def times(self) -> list[str]:
+        """Return the columns of times that are read alone, so that they may be texts."""
+        return [single_column(self.expressions[target]) for target in ("t", "utc") if target in self.expressions]
 
     def values(self, table: Mapping[str, NDArray[np.float64]], count: int) -> dict[str, NDArray[np.float64]]:
         """Return the targets in SI units."""
@@ -357,6 +425,8 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
     _frames(found, options, errors)
     if whole:
         _complete(found, columns, errors)
+    dates = [column for column in columns if split_header(column)[0] in DATE_WORDS and column not in found.times]
+    found.date = dates[0] if dates else ""
     if errors:
         raise RecordingError("\n".join(errors))
     found.ground = bool(options.axes) or split_header(found.user_labels.get("x", ""))[0] in EAST_HEADERS
@@ -383,8 +453,10 @@ def _mapped(found: ColumnLayout, columns: Sequence[str], options: ImportOptions)
                 hint = suggest(target, TARGETS, f"known: {', '.join(TARGETS)}", cutoff=0.6)
                 raise RecordingError(f"--map {target}:={text}: no target {target}; {hint}")
             if target == "id" and text.strip() == "file":
+                options.used.add("map id")
                 continue
-            tree = parse_expression(text, target)
+            options.used.add(f"map {target}")
+            tree = parse_expression(quote_names(text, columns), target)
             check_columns(tree, columns, found.where, target)
             if target == "id":
                 found.id = single_column(tree)
@@ -393,14 +465,14 @@ def _mapped(found: ColumnLayout, columns: Sequence[str], options: ImportOptions)
                 continue
             one = single_column(tree)
             meaning = header_meaning(one) if one else None
-            unit = (
-                meaning.unit
-                if meaning is not None and meaning.target == target
-                else (split_header(one)[1] if one else "")
-            )
-            found.expressions[target], found.user_labels[target] = tree, text.strip()
-            alone = bool(one)
-            found.factors[target] = column_factor(target, unit, found.where, options) if alone else 1.0
+            unit = split_header(one)[1] if one else ""
+            # A label in parentheses can stand in further expressions, as messages write them.
+            found.expressions[target], found.user_labels[target] = tree, one or f"({text.strip()})"
+            if target == "t" and meaning is not None and meaning.target == "frame" and not options.time_unit:
+                found.factors[target] = frame_length(f"{found.where}: column {one}", options)
+                continue
+            found.factors[target] = column_factor(target, unit, found.where, options) if one else 1.0
+            found.unitless += [target] if one and _unitless(target, unit, options) else []
             if target == "alt" and meaning is not None:
                 found.datum = meaning.datum
         except RecordingError as error:
@@ -411,9 +483,14 @@ def _mapped(found: ColumnLayout, columns: Sequence[str], options: ImportOptions)
 
 def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
     errors, unsaid = [], []
-    for column in columns:
+    # A column that --map reads alone has the meaning that the map gives it, and no second one.
+    mapped = {names[0] for tree in found.expressions.values() if len(names := column_names(tree)) == 1}
+    placed = {"lat", "lon"} <= set(options.map)
+    for column in sorted(columns, key=lambda column: split_header(column)[0] in PROGRAM_WORDS):
         meaning = header_meaning(column)
-        if meaning is None or meaning.target in found.expressions:
+        if meaning is None or meaning.target in found.expressions or column in mapped:
+            continue
+        if placed and meaning.target in POSITION_TARGETS:
             continue
         if meaning.target == "id":
             if "id" not in options.map:
@@ -431,6 +508,7 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
         found.factors[meaning.target] = meaning.sign * scale
         found.user_labels[meaning.target] = column
         found.datum = meaning.datum or found.datum
+        found.unitless += [meaning.target] if _unitless(meaning.target, meaning.unit, options) else []
         if meaning.target in POSITION_TARGETS and not meaning.unit and not options.unit:
             unsaid.append(column)
     if {"lat", "lon", "alt", "z"} <= set(found.expressions) and "z" not in options.map and "x" not in found.expressions:
@@ -443,7 +521,7 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
     # Lengths without a unit are metres in logs of robots, but pixels in files of trackers and
     # cameras: there they are refused.
     if unsaid:
-        hints = [f"{c} comes from a tracker" for c in columns if split_header(c)[0] in OF_A_TRACKER]
+        hints = [f"{c} comes from a tracker" for c in columns if split_header(c)[0].split("_")[-1] in OF_A_TRACKER]
         if "t" not in found.expressions and "frame" in found.expressions:
             hints.append(f"{found.user_labels['frame']} comes from a camera")
         if hints:
@@ -453,6 +531,12 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
         )
 
 
+def _unitless(target: str, unit: str, options: ImportOptions) -> bool:
+    """Return True if neither the header nor an option names the unit of a time or a position."""
+    named = options.time_unit if target in ("t", "utc") else options.unit
+    return target in ("t", "utc", *POSITION_TARGETS) and not unit and not named
+
+
 def _frames(found: ColumnLayout, options: ImportOptions, errors: list[str]) -> None:
     """Use frame numbers as time where there is no other time."""
     counted = options.time_unit == "frames" and "t" in found.expressions
@@ -460,12 +544,9 @@ def _frames(found: ColumnLayout, options: ImportOptions, errors: list[str]) -> N
         _copy(found, "frame", "t")
         counted = True
     if counted:
-        if options.fps is None:
-            errors.append(
-                f"{found.where}: column {found.user_labels['t']} counts frames; say how many a second: --fps 25"
-            )
-        else:
-            found.factors["t"] = 1.0 / options.fps
+        with collect_errors(errors):
+            found.factors["t"] = frame_length(f"{found.where}: column {found.user_labels['t']}", options)
+        found.unitless = [target for target in found.unitless if target != "t"]
     _drop(found, "frame")
 
 
@@ -492,6 +573,8 @@ def _ned(found: ColumnLayout, options: ImportOptions) -> None:
         return
     # Swapped by way of an empty name, for positions, velocities and commands.
     for first, second, third in (POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS):
+        if {first, second, third} & set(found.expressions):
+            options.used.add("axes")
         if first in found.expressions and second in found.expressions:
             _copy(found, first, "")
             _copy(found, second, first)

@@ -54,6 +54,12 @@ class ImportOptions:
     decimal: str = "."
     delimiter: str = ""
     done: Callable[[float], None] = ignore_progress
+    used: set[str] = field(default_factory=set)  # options that a reader made use of; those of no use are refused
+
+    def use(self, name: str) -> Any:
+        """Return an option, and note that it was of use."""
+        self.used.add(name)
+        return getattr(self, name)
 
 
 class RowFlag(NamedTuple):
@@ -82,6 +88,7 @@ class ImportedTrack:
     datum   : what heights are above: "", "amsl", "ellipsoid" or "home"
     origin  : latitude, longitude (degrees) and height (m) of x = y = z = 0, if known
     fixed_units : whether its units are those of an autopilot, which nobody chooses
+    unitless: whether nobody has named the unit of x and y
     ground  : whether its axes are known to point east and north
     air     : (row,) whether it was in the air; None if the file does not tell
     breaks  : rows at which the estimator was reset, so that positions before and after do not belong together
@@ -100,6 +107,7 @@ class ImportedTrack:
     origin: tuple[float, float, float] | None = None
     fixed_units: bool = False
     ground: bool = False
+    unitless: bool = False
     in_air: NDArray[np.bool_] | None = None
     breaks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     flags: dict[str, tuple["RowFlag", NDArray[np.float64]]] = field(default_factory=dict)
@@ -137,6 +145,7 @@ class ImportReport:
     accepted_kinds: frozenset[str] = frozenset()
     errors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    since: float = 0.0  # s to which a window of time is added: that of the first row, where times count since 1970
 
     def add_error(self, line: str, kind: str = "") -> bool:
         """Add an error; one of a kind that the user accepts becomes a note. Return True if it was accepted."""

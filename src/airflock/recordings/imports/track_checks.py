@@ -356,8 +356,11 @@ def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport
         heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
         rows = sum(len(z) for _, z in heights)
         deep = [(track, np.flatnonzero(z < -1.0)) for track, z in heights]
-        # Heights above the start scatter about 0 on the ground, so a few below -1 m are no error.
-        if not rows or sum(len(low) for _, low in deep) <= 0.9 * rows:  # around 0 some are always below
+        # Heights above the start scatter about 0 on the ground, so a few below -1 m are no error; but of a log that
+        # stands for most of the time only what is off the ground counts.
+        below, deepest = sum(len(low) for _, low in deep), min((float(z.min()) for _, z in heights), default=0.0)
+        off = sum(int((np.abs(z) > 1.0).sum()) for _, z in heights)
+        if not rows or below <= 0.9 * (off if deepest < -5.0 else rows):  # around 0 some are always below
             continue
         track, low = next((track, low) for track, low in deep if len(low))
         name = track.label("z")
@@ -502,14 +505,18 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
         findings.add_error(swapped, "axes")
         return
     axes = range(len(slopes))
-    turned = [i for i in axes if lively[i] and r[i, i] < -0.5]
+    # Climbs are slow beside flight along the ground, but where they agree with the heights but for the sign it shows.
+    turned = [i for i in axes if r[i, i] < (-0.5 if lively[i] else -0.9)]
     for i in turned:
         speed = track.label(VELOCITY_TARGETS[i])
+        # Heights lie above the ground: where they do not, it is they that point down, and not the speeds.
+        deep = i == 2 and float(track.columns["z"].mean()) < 0.0
+        turn, label = ("z", track.label("z")) if deep else (VELOCITY_TARGETS[i], speed)
         findings.add_error(
             f"{source}: column {track.label(POSITION_TARGETS[i])}, "
             f"row {track.rows[0]} on: {POSITION_TARGETS[i]} grows where "
             f"{speed} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
-            f'write --map "{VELOCITY_TARGETS[i]}:=-{quote_column(speed)}"',
+            f'write --map "{turn}:=-{quote_column(label)}"',
             "axes",
         )
     # A sign is reported before a scale: a turned axis has a slope of -1, which is no wrong unit.
@@ -517,7 +524,7 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
     wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
     if wrong:
         columns, slope = ", ".join(track.label(POSITION_TARGETS[i]) for i in wrong), float(np.median(slopes[wrong]))
-        reason = _scale_reason(track, slope)
+        reason = _scale_reason(track, slope, [i for i in axes if i in wrong or not lively[i]])
         line = f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast as the "
         line += "velocities say"
         # Noise of the velocities flattens a slope, at most to the slope times r^2 (Frisch 1934). Heights and climbs
@@ -545,13 +552,20 @@ def _swap_error(source: str, track: ImportedTrack, likeness: AxisCorrelation) ->
     return ""
 
 
-def _scale_reason(track: ImportedTrack, slope: float) -> str:
-    """Return cause and remedy for positions that change a multiple as fast as the velocities say; empty if unknown."""
+def _scale_reason(track: ImportedTrack, slope: float, axes: list[int]) -> str:
+    """Return cause and remedy for positions that change a multiple as fast as the velocities say, along axes; or ""."""
     near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
     if abs(np.log(near / slope)) >= 0.1:
         return ""
     words, changes = REASONS[near]
-    return f"{words}: write {', or '.join(_mapped(track, *change) for change in changes)}"
+    columns = {"x": POSITION_TARGETS, "vx": VELOCITY_TARGETS}
+    ways = [
+        " ".join(
+            _mapped(track, each, wrong) for each in ([columns[target][i] for i in axes] if target != "t" else ["t"])
+        )
+        for target, wrong in changes
+    ]
+    return f"{words}: write {', or '.join(ways)}"
 
 
 def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
