@@ -36,15 +36,22 @@ def read_array(
         values = values[:, None, :]
     if values.ndim != 3 or values.shape[2] not in (2, 3):
         raise RecordingError(f"{where}: has shape {values.shape}; give (frame, individual, 2 or 3)")
-    if len(values) < values.shape[1] and _smoother_across(values):
-        findings = ImportReport() if findings is None else findings
+    findings = ImportReport() if findings is None else findings
+    even = np.diff(values[:, 0, 0]) if np.ndim(array) == 2 and values.shape[2] == 3 else np.empty(0)
+    if len(even) > 3 and 0.0 <= np.ptp(even) < 1e-6 * even[0]:
         findings.add_error(
-            f"{where}: shape {values.shape} is read as {len(values)} frames of {values.shape[1]} individuals, but "
-            "neighbours along the second axis lie closer than those along the first: individuals first? "
-            f"Exchange the axes: python -c \"import numpy as np; np.save('frames.npy', ARRAY.swapaxes(0, 1))\"",
+            f"{where}: column 1, row 1 on: grows by one step, as times do, and would be read as x; give a table with "
+            'names, such as {"t": a[:, 0], "x": a[:, 1], "y": a[:, 2]}',
             "axes",
         )
-        findings.raise_errors()
+    if _roughness(values, 1) < 0.5 and (_roughness(values, 0) > 1.0 or len(values) < 3):
+        findings.add_error(
+            f"{where}: {values.shape} are {len(values)} frames of {values.shape[1]} individuals, row 1 on, but places "
+            "go smoothly along the second axis, and not along the first: individuals first? Exchange the axes: "
+            "python -c \"import numpy as np; np.save('frames.npy', ARRAY.swapaxes(0, 1))\"",
+            "axes",
+        )
+    findings.raise_errors()
     rate, scale = options.use("fps") or fps, math.nan
     options.used.update({"time_unit"} if options.time_unit == "frames" else ())
     errors = [] if rate else [f"{where}: counts frames; say how many a second: --fps 25"]
@@ -62,10 +69,18 @@ def read_array(
     return found
 
 
-def _smoother_across(values: Any) -> bool:
-    """Return True if places change less along the second axis than along the first, which should be time."""
-    along, across = (float(np.nanmedian(np.abs(np.diff(values.astype(float), axis=axis)))) for axis in (0, 1))
-    return across < 0.5 * along
+def _roughness(values: Any, axis: int) -> float:
+    """Return by how much steps along an axis change, relative to the steps: little along time, if it is one."""
+    if values.shape[axis] < 3:
+        return math.inf
+    step = np.diff(values.astype(float), axis=axis)
+    turn = np.diff(step, axis=axis)
+    sound = np.isfinite(turn)
+    return (
+        float(np.median(np.abs(turn[sound])) / np.median(np.abs(step[np.isfinite(step)]) + 1e-300))
+        if sound.any()
+        else math.inf
+    )
 
 
 def _numbers(array: Any, where: str) -> Any:

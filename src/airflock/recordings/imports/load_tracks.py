@@ -65,12 +65,13 @@ def load_tracks(
     Parameters
     ----------
     source : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
-        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy), a table, such as {"t": [...], "id":
+        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy, .mat), a table, such as {"t": [...], "id":
         [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
     map : mapping, optional
         Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z
         (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m), utc (s since 1970),
-        air (1 in flight) and id. Headers with units need none: `x [mm]`, `time_us`.
+        air (1 in flight) and id. Headers with units need none: `x [mm]`, `time_us`. Of files of several arrays
+        `position` is the name of one.
     unit : str
         Of lengths that bring none: m, cm, mm, km, ft or px.
     scale : float, optional
@@ -200,7 +201,7 @@ def read_tracks(
     """
     tracks = _read(source, options, findings)
     findings.raise_errors()
-    _refuse_unused(options, findings)
+    _refuse_unused(tracks, options, findings)
     tracks = track_checks.drop_rejected_rows(tracks, findings)
     tracks = track_checks.drop_incomplete_rows(tracks, findings)
     track_checks.check_columns(tracks, findings)
@@ -236,23 +237,23 @@ def read_tracks(
 
 # Options that are of no use are refused: a rate that is ignored gives speeds that are wrong in silence.
 UNUSED = {
-    "unit": "no length lacks a unit; expressions of --map must give metres",
+    "unit": "no length lacks a unit, and expressions of --map give metres",
     "scale": "nothing is in pixels; write --unit px as well",
-    "time_unit": "no time lacks a unit; expressions of --map must give seconds",
-    "fps": "no time counts frames; if it does, write --time-unit frames as well",
+    "time_unit": "no time lacks a unit, and expressions of --map give seconds",
+    "fps": "column {t} counts no frames; if it does, write --time-unit frames as well",
     "keypoint": "no file has keypoints",
-    "axes": "files and formats that say which axes theirs are, and arrays, are not turned round",
+    "axes": "arrays, fixes and logs that say which axes theirs are stay as they are",
     "decimal": "no file is a text",
     "delimiter": "no file is a text",
 }
 
 
-def _refuse_unused(options: ImportOptions, findings: ImportReport) -> None:
+def _refuse_unused(tracks: list[ImportedTrack], options: ImportOptions, findings: ImportReport) -> None:
     """Add an error for each option that no file makes use of."""
-    plain = ImportOptions()
-    for name, why in UNUSED.items():
-        value = getattr(options, name)
-        if value != getattr(plain, name) and name not in options.used and value != "enu":
+    own = {name: getattr(options, name) for name in UNUSED if name not in options.used}
+    for name, value in own.items():
+        if value not in ("", None, "enu") and (name, value) != ("decimal", "."):
+            why = UNUSED[name].format(t=tracks[0].label("t"))
             findings.errors.append(f"--{name.replace('_', '-')} {value}: of no use: {why}, or leave it out")
     for target, text in options.map.items():
         if f"map {target}" not in options.used:
@@ -260,29 +261,48 @@ def _refuse_unused(options: ImportOptions, findings: ImportReport) -> None:
     findings.raise_errors()
 
 
+def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
+    """Leave out rows whose time lies far off both neighbours, which agree, or years off all others; note the rows."""
+    time, steps = track.time, np.diff(track.time)
+    usual = float(np.median(np.abs(steps))) if len(steps) > 3 else 0.0
+    if not usual or (0.0 <= steps.min() and steps.max() <= 20.0 * usual):
+        return
+    ahead, behind = time[1:-1] - time[:-2], time[2:] - time[1:-1]
+    lone = (np.minimum(np.abs(ahead), np.abs(behind)) > 20.0 * usual) & (np.abs(ahead + behind) < 20.0 * usual)
+    bad = np.zeros(len(time), bool)
+    # A row that came late has its place in a hole of the others; a corrupt time has none.
+    for row in np.flatnonzero(lone & ((ahead < 0.0) | (behind < 0.0))) + 1 if lone.mean() < 0.1 else ():
+        others = np.sort(np.delete(time, row))
+        at = int(np.searchsorted(others, time[row]))
+        bad[row] = not 0 < at < len(others) or others[at] - others[at - 1] < 1.5 * usual
+    # A clock that was not set yet says 1970 or 1980 in the first rows.
+    off = np.abs(time - np.median(time))
+    bad |= off > max(1e7, 1e3 * float(np.ptp(np.quantile(time, [0.1, 0.9]))))
+    if bad.any() and bad.mean() < 0.1:
+        findings.notes.append(
+            f"{track.source}: column {track.label('t')}: {bad.sum()} rows of {track.name} with a corrupt time left out, "
+            f"first row {track.rows[bad][0]} ({time[bad][0]:.10g} s among times about {np.median(time):.10g} s)"
+        )
+        track.keep(~bad)
+
+
 def _question_lengths(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Ask whether positions of a file without a unit are degrees, or smaller than metres."""
-    if not all(track.unitless for track in tracks):
+    some = [(track, slice(0, 10_000)) for track in tracks if track.unitless]
+    places = [track.stack(POSITION_TARGETS, 2)[rows] for track, rows in some]
+    speeds = [np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(track.time[rows])
+              for place, (track, rows) in zip(places, some, strict=True)]  # fmt: skip
+    moving = np.concatenate([speed[speed > 0.0] for speed in speeds] or [np.empty(0)])
+    if len(moving) < 5:
         return
-    speeds, places = [np.empty(0)], []
-    for track in tracks:
-        place, span = track.stack(POSITION_TARGETS, 2), np.diff(track.time)
-        step = np.linalg.norm(np.diff(place, axis=0), axis=1)
-        moved = (step > 0.0) & (span > 0.0)
-        speeds.append(step[moved] / span[moved])
-        places.append(np.abs(place))
-    every, every_speed = np.concatenate(places), np.concatenate(speeds)
-    if len(every_speed) < 5:
-        return
-    x, y = (tracks[0].label(axis) for axis in "xy")
-    far, usual = every.max(axis=0), float(np.median(every_speed))
-    line = (
-        f"{tracks[0].source}: column {x}, {y}, row {tracks[0].rows[0]}: no unit, and rows move by {usual:.3g} a second"
-    )
-    lon, lat = (y, x) if far[1] > 90.0 >= far[0] else (x, y)
+    usual, every, first = float(np.median(moving)), np.abs(np.concatenate(places)), tracks[0]
+    x, y = first.label("x"), first.label("y")
+    line = f"{first.source}: column {x}, {y}, row {first.rows[0]}: no unit, and rows move by {usual:.3g} a second"
     # A bird makes 1e-4 degrees a second; what moves as little in metres lies about the origin, or stands.
+    far = every.max(axis=0)
     degrees = far.max() <= 180.0 and far.min() <= 90.0 and np.median(every) > 1.0
-    if usual < SLOWEST and degrees and not tracks[0].has(VELOCITY_TARGETS):
+    if usual < SLOWEST and degrees and not first.has(VELOCITY_TARGETS):
+        lon, lat = (y, x) if far[1] > 90.0 else (x, y)
         ways = f'--map "lon:={quote_column(lon)}" --map "lat:={quote_column(lat)}"'
         findings.add_error(
             f"{line}: degrees? Write {ways}; if they are metres, --unit m; if times are no seconds, for instance "
@@ -290,30 +310,6 @@ def _question_lengths(tracks: list[ImportedTrack], findings: ImportReport) -> No
         )
     elif usual > FASTEST:
         findings.add_error(f"{line}: cm or mm? Write --unit cm, or --unit mm; if they are metres, --unit m")
-
-
-def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
-    """Leave out rows whose time lies far off both neighbours, which agree, or years off all others; note the rows."""
-    time = track.time
-    if len(time) < 5:
-        return
-    steps = np.diff(time)
-    usual = float(np.median(np.abs(steps)))
-    between = (time[2:] >= time[:-2]) & ((time[1:-1] < time[:-2]) | (time[1:-1] > time[2:]))
-    off = np.minimum(np.abs(time[1:-1] - time[:-2]), np.abs(time[2:] - time[1:-1]))
-    bad = np.zeros(len(time), bool)
-    bad[1:-1] = between & (off > 20.0 * usual) & (time[2:] - time[:-2] < 20.0 * usual)
-    # A clock that was not set yet: 1970 or 1980 in the first rows.
-    middle = float(np.median(time))
-    spread = float(np.ptp(np.quantile(time, [0.1, 0.9])))
-    bad |= (np.abs(time - middle) > 1e7) & (np.abs(time - middle) > 1e3 * spread)
-    if bad.any() and bad.mean() < 0.1:
-        row = track.rows[bad][0]
-        findings.notes.append(
-            f"{track.source}: column {track.label('t')}: {bad.sum()} rows of {track.name} with a corrupt time left "
-            f"out, first row {row} ({time[bad][0]:.10g} s between rows at about {middle:.10g} s)"
-        )
-        track.keep(~bad)
 
 
 def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:

@@ -409,9 +409,16 @@ def degrees_in_x_and_y(rng, tmp_path):
 
 @question
 def array_of_individuals_first(rng, tmp_path):
-    truth = Truth(rng)
+    truth = Truth(rng, count=int(rng.choice([1, 2, 5, 200])))
     np.save(tmp_path / "a.npy", truth.place.swapaxes(0, 1))
     return tmp_path / "a.npy", {"fps": 10.0, "unit": "m"}, "individuals first? Exchange the axes"
+
+
+@kind
+def array_of_more_individuals_than_frames(rng, tmp_path):
+    truth = Truth(rng, count=int(rng.integers(100, 200)))
+    np.save(tmp_path / "a.npy", truth.place)
+    return truth, tmp_path / "a.npy", {"fps": truth.rate, "unit": "m"}
 
 
 @question
