@@ -175,7 +175,7 @@ def test_a_log_of_ardupilot_without_positions_says_what_to_do(tmp_path):
     for name, said in (
         ("noise.bin", "is no DataFlash log of ArduPilot"),
         ("old.log", "of ArduPilot give the .bin that it was made from"),
-        ("plane.bin", "mavlogdump.py --format csv --types XKF1 plane.bin > plane.csv"),
+        ("plane.bin", "nor XKF1, NKF1, POS, GPS; it has FMT; log one of those (LOG_BITMASK)"),
     ):
         with pytest.raises(RecordingError) as fault:
             airflock.load_tracks(tmp_path / name)

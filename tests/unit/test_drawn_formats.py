@@ -2,6 +2,7 @@
 
 import json
 import re
+import struct
 from pathlib import Path
 from typing import get_args
 
@@ -365,7 +366,30 @@ def frames_by_map(rng, tmp_path):
     return truth, csv(tmp_path, table), {"map": {"t": header, "id": "fish"}, "fps": truth.rate, **unit}
 
 
-SLOW = {"matlab", "matlab_since_7_3", "sleap_analysis"}
+@kind
+def dataflash_of_a_plane(rng, tmp_path):
+    """Messages of the filters EKF3 or EKF2, of two cores, or POS; source of the layout: AP_Logger/LogStructure.h."""
+    pytest.importorskip("pymavlink")
+    truth = Truth(rng, count=1)
+    kind = str(rng.choice(["XKF1", "NKF1"]))
+    columns = "TimeUS,C,VN,VE,VD,PN,PE,PD" if kind == "XKF1" else "TimeUS,VN,VE,VD,PN,PE,PD"
+    form = "QBffffff" if kind == "XKF1" else "Qffffff"
+    head = struct.pack(
+        "<BB4s16s64s", 130, 3 + struct.calcsize("<" + form), kind.encode(), form.encode(), columns.encode()
+    )
+    fmt = struct.pack("<BB4s16s64s", 128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
+    log = [b"\xa3\x95\x80" + fmt, b"\xa3\x95\x80" + head]
+    for k, t in enumerate(truth.t):
+        (east, north), (ve, vn) = truth.place[k, 0], truth.velocity[k, 0]
+        for core in (0, 1) if kind == "XKF1" else (0,):
+            number = [core] if kind == "XKF1" else []
+            place = (vn, ve, 0.0, north + 3.0 * core, east, -30.0)
+            log.append(b"\xa3\x95\x82" + struct.pack("<" + form, round(8e7 + 1e6 * t), *number, *place))
+    (tmp_path / "plane.bin").write_bytes(b"".join(log))
+    return truth, tmp_path / "plane.bin", {}
+
+
+SLOW = {"dataflash_of_a_plane", "matlab", "matlab_since_7_3", "sleap_analysis"}
 
 
 @pytest.mark.parametrize("name", KINDS)

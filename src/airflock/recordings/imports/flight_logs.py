@@ -126,10 +126,7 @@ def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -
     contents = ReaderProcess(path, read_dataflash_arrays, "a DataFlash log", pace=PACE).answer(options.done)
     rows = {part: contents[part].values for part in PARTS if part in contents}
     if "PSCN" not in rows or "PSCE" not in rows:
-        raise RecordingError(
-            f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later); write its estimates as a table: "
-            f"mavlogdump.py --format csv --types XKF1 {path.name} > {path.stem}.csv"
-        )
+        return [_estimated(path, findings)]
     found = _joined(rows, path)
     found.clock, found.datum = "boot", "amsl"
     if "ORGN" in contents:
@@ -137,6 +134,40 @@ def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -
         found.origin = (latitude, longitude, height)
     found.utc = _gps_times(contents["GPS"].values) if "GPS" in contents else None
     return [found]
+
+
+LOCAL_FIELDS = {"y": "PN", "x": "PE", "z": "PD", "vy": "VN", "vx": "VE", "vz": "VD"}
+GEODETIC_FIELDS = {"lat": "Lat", "lon": "Lng", "alt": "Alt"}
+# Messages that say where a vehicle is, the best first (EKF3, EKF2, what the pilot sees, the receiver), with the number
+# of the filter or the receiver.
+ESTIMATES = {"XKF1": ("C", LOCAL_FIELDS), "NKF1": ("C", LOCAL_FIELDS), "POS": ("I", GEODETIC_FIELDS),
+             "GPS": ("I", GEODETIC_FIELDS)}  # fmt: skip
+
+
+def _estimated(path: Path, findings: ImportReport) -> ImportedTrack:
+    """Read the estimates of a plane, a rover or an old release, which log no PSCN and PSCE."""
+    contents = ReaderProcess(path, read_estimate_arrays, "a DataFlash log", pace=PACE).answer()
+    kind = next((kind for kind in ESTIMATES if kind in contents), "")
+    if not kind:
+        raise RecordingError(
+            f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later), nor {', '.join(ESTIMATES)}; "
+            f"it has {contents.attrs['kinds']}; log one of those (LOG_BITMASK)"
+        )
+    findings.notes.append(
+        f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later): {kind} is read, row 0 on; no commands"
+    )
+    table, fields = contents[kind].values, ESTIMATES[kind][1]
+    numbers = np.nan_to_num(table[:, 1])
+    table = table[numbers == numbers.min()]  # the first of several filters or receivers
+    columns = {name: (-1.0 if name in ("z", "vz") else 1.0) * table[:, 2 + c] for c, name in enumerate(fields)}
+    labels = {name: f"{kind}.{field}" for name, field in fields.items()}
+    found = ImportedTrack(path.stem, str(path), table[:, 0] * 1e-6, columns, np.arange(len(table)), labels, "boot")
+    found.datum = "amsl"
+    found.utc = _gps_times(contents["GPS"].values[:, [0, 5, 6, 1]]) if "GPS" in contents else None
+    if "ORGN" in contents:
+        latitude, longitude, height = (float(value) for value in contents["ORGN"].values[-1])
+        found.origin = (latitude, longitude, height)
+    return found
 
 
 def _gps_times(table: Any) -> Any:
@@ -221,6 +252,18 @@ def read_dataflash_arrays(path: str, _: int, share: OnShare) -> Contents:
     }
     fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": ("TimeUS", "GWk", "GMS", "I")}
     return _tables(DFReader.DFReader_binary(path), fields, lambda message: [], share)
+
+
+def read_estimate_arrays(path: str, _: int, share: OnShare) -> Contents:
+    """Read tables of time (µs), number of the filter, place and velocity; `kinds` names all messages of the log."""
+    from pymavlink import DFReader
+
+    log = DFReader.DFReader_binary(path)
+    fields = {kind: ("TimeUS", number, *own.values()) for kind, (number, own) in ESTIMATES.items()}
+    fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": (*fields["GPS"], "GWk", "GMS")}
+    _, tables = _tables(log, fields, lambda message: [], share)
+    kinds = [name for name, number in log.name_to_id.items() if log.counts[number]]
+    return {"kinds": ", ".join(sorted(kinds))}, tables
 
 
 def read_telemetry_arrays(path: str, _: int, share: OnShare) -> Contents:

@@ -65,8 +65,8 @@ def load_tracks(
     Parameters
     ----------
     source : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
-        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy, .mat), a table, such as {"t": [...], "id":
-        [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
+        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy, .mat), a table, such as
+        {"t": [...], "id": [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
     map : mapping, optional
         Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z
         (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m), utc (s since 1970),
@@ -280,8 +280,8 @@ def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
     bad |= off > max(1e7, 1e3 * float(np.ptp(np.quantile(time, [0.1, 0.9]))))
     if bad.any() and bad.mean() < 0.1:
         findings.notes.append(
-            f"{track.source}: column {track.label('t')}: {bad.sum()} rows of {track.name} with a corrupt time left out, "
-            f"first row {track.rows[bad][0]} ({time[bad][0]:.10g} s among times about {np.median(time):.10g} s)"
+            f"{track.source}: column {track.label('t')}: {bad.sum()} rows of {track.name} with a corrupt time left "
+            f"out, first row {track.rows[bad][0]} ({time[bad][0]:.10g} s among times about {np.median(time):.10g} s)"
         )
         track.keep(~bad)
 
