@@ -131,10 +131,20 @@ def one_corrupt_stamp(rng, tmp_path):
     times[row] = (
         rng.choice([0.0, 1e9, times[-1] + 5e4, -1e5]) if since == 0.0 else rng.choice([0.0, 1e10, times[-1] + 5e4])
     )
-    if times[row] == 0.0 and row < 21:
-        times[row] = 1e9 if since == 0.0 else 0.0
+    if times[row] == since == 0.0 and row < 21:
+        times[row] = 1e9
     truth.corrupt = row
     return truth, csv(tmp_path, truth.long(x="x_m", y="y_m", times=times)), {}
+
+
+@kind
+def a_row_that_came_late(rng, tmp_path):
+    truth = Truth(rng, count=1)
+    table = truth.long(x="x_m", y="y_m")
+    row, place = int(rng.integers(1, 15)), int(rng.integers(37, len(table)))
+    late = table.iloc[[row]]
+    rest = table.drop(index=row)
+    return truth, csv(tmp_path, pd.concat([rest.iloc[:place], late, rest.iloc[place:]])), {}
 
 
 @kind
@@ -411,6 +421,16 @@ def test_a_drawn_file_is_read_as_the_motion_that_it_holds(tmp_path, name):
         truth.check(found)
 
 
+@pytest.mark.parametrize(("row", "stamp"), [(0, 5e4), (0, 1e10), (-1, 0.05), (-1, -1e5)])
+def test_a_corrupt_time_of_the_first_or_last_row_is_left_out(row, stamp):
+    table = Truth(np.random.default_rng(4), rate=10.0, count=1).long(x="x_m", y="y_m")
+    plain = airflock.load_tracks(table.drop(index=table.index[row]))
+    table.loc[table.index[row], "t"] = stamp
+    found = airflock.load_tracks(table)
+    assert np.array_equal(found["position"], plain["position"])
+    assert any("1 rows of bird_0 with a corrupt time left out" in note for note in notes_of(found))
+
+
 # Questions: nothing in the file decides, so that nothing may be assumed.
 QUESTIONS = {}
 
@@ -448,7 +468,7 @@ def array_of_more_individuals_than_frames(rng, tmp_path):
 @question
 def arrays_without_a_known_name(rng, tmp_path):
     truth = Truth(rng)
-    names = rng.permutation(["a", "data", "run1"])[: rng.integers(2, 4)]
+    names = rng.permutation(["a", "data", "run1"])[: rng.integers(2, 4)] if rng.random() < 0.7 else ["velocities"]
     np.savez(tmp_path / "a.npz", **{name: truth.place * k for k, name in enumerate(names, 1)})
     return tmp_path / "a.npz", {"fps": 10.0, "unit": "m"}, "write --map position:=NAME"
 
@@ -812,7 +832,7 @@ def test_a_window_of_files_with_dates_counts_from_the_first_row():
     assert any("--begin and --end count from the first row" in note for note in notes_of(dates))
 
 
-@pytest.mark.parametrize("text", ["=1+1", "@SUM(1)", "+cmd", "-2+3", "\t=1", " =1"])
+@pytest.mark.parametrize("text", ["=1+1", "@SUM(1)", "+cmd", "-2+3", "\t=1", " =1", "-2+3"])
 def test_no_exported_name_is_a_formula(tmp_path, text):
     found = airflock.load_tracks(Truth(np.random.default_rng(1), count=2).long(x="x_m", y="y_m"))
     found = found.assign_coords(individual=[text, "ok"])

@@ -114,8 +114,8 @@ def write_csv(recording: xr.Dataset, path: str | os.PathLike[str], *, px4_column
     """Write a long CSV table, with as many digits as the numbers have; `px4_columns` : as a log of PX4 has it."""
     text = io.StringIO()
     table = (to_log_table if px4_columns else to_table)(recording)
-    # A spreadsheet runs a cell that begins like a formula; an apostrophe makes it a text.
-    table["id"] = table["id"].where(~table["id"].str.match(r"\s*[=+\-@\t\r]"), "'" + table["id"])
+    # A spreadsheet runs a cell that begins like a formula, and is no number; an apostrophe makes it a text.
+    table["id"] = table["id"].where(~table["id"].str.match(r"\s*(?![+-]?[\d.]+$)[=+\-@]"), "'" + table["id"])
     table.to_csv(text, index=False)
     atomic.write_file(path, text.getvalue())
     return Path(path)

@@ -1,6 +1,7 @@
 """Read arrays and datasets: NumPy files, trajectories of idtracker.ai, and netCDF or HDF5 files of `movement`."""
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,7 @@ def read_members(
     axes = [axis for axis in POSITION_TARGETS if axis in lower and lower[axis].ndim == 2]
     if not fit and axes[:2] == ["x", "y"] and len({lower[axis].shape for axis in axes}) == 1:
         arrays["positions"], fit = np.stack([lower[axis] for axis in axes], axis=-1), ["positions"]
-    alone = fit or len(arrays) == 1
+    alone = fit or (len(arrays) == 1 and not re.search("vel|speed|acc|head|angle|orient", *lower))
     chosen = options.map.get("position") or next((n for n in arrays if not fit or n.lower() == fit[0]), "") * bool(
         alone
     )

@@ -261,7 +261,7 @@ def read_estimate_arrays(path: str, _: int, share: OnShare) -> Contents:
     log = DFReader.DFReader_binary(path)
     fields = {kind: ("TimeUS", number, *own.values()) for kind, (number, own) in ESTIMATES.items()}
     fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": (*fields["GPS"], "GWk", "GMS")}
-    _, tables = _tables(log, fields, lambda message: [], share)
+    tables = _tables(log, fields, lambda message: [], share)[1]
     kinds = [name for name, number in log.name_to_id.items() if log.counts[number]]
     return {"kinds": ", ".join(sorted(kinds))}, tables
 

@@ -269,9 +269,10 @@ def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
         return
     ahead, behind = time[1:-1] - time[:-2], time[2:] - time[1:-1]
     lone = (np.minimum(np.abs(ahead), np.abs(behind)) > 20.0 * usual) & (np.abs(ahead + behind) < 20.0 * usual)
+    lone = np.r_[steps[0] < -20.0 * usual, lone & ((ahead < 0.0) | (behind < 0.0)), steps[-1] < -20.0 * usual]
     bad = np.zeros(len(time), bool)
     # A row that came late has its place in a hole of the others; a corrupt time has none.
-    for row in np.flatnonzero(lone & ((ahead < 0.0) | (behind < 0.0))) + 1 if lone.mean() < 0.1 else ():
+    for row in np.flatnonzero(lone) if lone.mean() < 0.1 else ():
         others = np.sort(np.delete(time, row))
         at = int(np.searchsorted(others, time[row]))
         bad[row] = not 0 < at < len(others) or others[at] - others[at - 1] < 1.5 * usual
@@ -437,7 +438,7 @@ READERS: dict[str, tuple[str, Reader]] = {
     ".mat": ("MATLAB arrays", array_readers.read_mat),
 }
 
-SLOWEST, FASTEST = 1e-3, 100.0  # m/s: usual speeds beyond are no metres, where nobody has said so
+SLOWEST, FASTEST = 2.5e-3, 100.0  # m/s: usual speeds beyond are no metres, where nobody has said so
 SINCE_1970 = 1e8  # s; times beyond count since 1970
 AUTOPILOT_SUFFIXES = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
 
