@@ -373,7 +373,13 @@ def frames_by_map(rng, tmp_path):
     header = str(rng.choice(["frame", "Frame", "frame_idx"]))
     table = truth.long(t=header, x="x_mm", y="y_mm", name="fish", times=np.arange(len(truth.t)), scale=1000.0)
     unit = {"unit": "mm"} if rng.random() < 0.5 else {}
-    return truth, csv(tmp_path, table), {"map": {"t": header, "id": "fish"}, "fps": truth.rate, **unit}
+    if rng.random() < 0.3:
+        table, unit = (
+            table.rename(columns={"x_mm": "x", "y_mm": "y", header: "k"}),
+            {"unit": "mm", "time_unit": "frames"},
+        )
+    time = "k" if "k" in table else header
+    return truth, csv(tmp_path, table), {"map": {"t": time, "id": "fish"}, "fps": truth.rate, **unit}
 
 
 @kind

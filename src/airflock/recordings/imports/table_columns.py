@@ -22,17 +22,8 @@ from airflock.support import RecordingError, collect_errors, suggest
 
 # Headers: the quantity in a column, and its unit.
 LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
-TIME_UNITS = {
-    "s": 1.0,
-    "sec": 1.0,
-    "ms": 1e-3,
-    "us": 1e-6,
-    "µs": 1e-6,
-    "ns": 1e-9,
-    "min": 60.0,
-    "h": 3600.0,
-    "cs": 0.01,
-}
+TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
+         "cs": 0.01}  # fmt: skip
 SPEED_UNITS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3, "km/h": 1 / 3.6, "kmh": 1 / 3.6,
           "kn": 1852.0 / 3600.0, "kt": 1852.0 / 3600.0, "ft/s": 0.3048, "mph": 0.44704}  # fmt: skip
 OTHER_COMMAND_UNITS = ("1", "m/s^2")  # units of commands that are headings or accelerations
@@ -153,9 +144,9 @@ def column_factor(target: str, unit: str, where: str, options: ImportOptions) ->
     if not kind or target in GEODETIC_TARGETS[:2]:
         return 1.0
     # An option is of use where the header has no unit, or the same one.
-    option = "time_unit" if target in ("t", "utc") else "unit"
-    if unit in ("", getattr(options, option)) and options.time_unit != "frames":
-        unit = options.use(option) if option == "time_unit" or target in (*POSITION_TARGETS, "alt") else unit
+    option = "time_unit" if target in ("t", "utc") else "unit" if target in (*POSITION_TARGETS, "alt") else ""
+    if option and unit in ("", getattr(options, option)) and getattr(options, option) != "frames":
+        unit = options.use(option)
     # A length unit on the command line means the same unit per second for velocities.
     if not unit and target in (*VELOCITY_TARGETS, *COMMAND_TARGETS) and options.unit not in ("", *PIXEL_UNITS):
         return LENGTH_UNITS[options.use("unit")]
