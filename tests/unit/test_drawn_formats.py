@@ -151,7 +151,8 @@ def a_row_that_came_late(rng, tmp_path):
 def array_of_npz(rng, tmp_path):
     truth = Truth(rng)
     name = str(rng.choice(["positions", "pos", "xy", "tracks", "position", "trajectories"]))
-    others = {"velocities": truth.velocity, "a": truth.place * 2.0, "headings": truth.place[..., 0], "n": np.array(3)}
+    others = {"names": np.array(["a", None], object)} if rng.random() < 0.3 else {}
+    others |= {"velocities": truth.velocity, "a": truth.place * 2.0, "headings": truth.place[..., 0], "n": np.array(3)}
     members = [*others.items(), (name, truth.place)]
     order = rng.permutation(len(members))
     np.savez(tmp_path / "sim.npz", **{members[k][0]: members[k][1] for k in order})

@@ -1,4 +1,4 @@
-"""Read arrays and datasets: NumPy files, trajectories of idtracker.ai, and netCDF or HDF5 files of `movement`."""
+"""Read arrays and datasets: files of NumPy and MATLAB, of idtracker.ai and SLEAP, and datasets of `movement`."""
 
 import math
 import re
@@ -76,12 +76,9 @@ def _roughness(values: Any, axis: int) -> float:
         return math.inf
     step = np.diff(values.astype(float), axis=axis)
     turn = np.diff(step, axis=axis)
-    sound = np.isfinite(turn)
-    return (
-        float(np.median(np.abs(turn[sound])) / np.median(np.abs(step[np.isfinite(step)]) + 1e-300))
-        if sound.any()
-        else math.inf
-    )
+    if not np.isfinite(turn).any():
+        return math.inf
+    return float(np.nanmedian(np.abs(turn)) / (np.nanmedian(np.abs(step)) + 1e-300))
 
 
 def _numbers(array: Any, where: str) -> Any:
@@ -110,7 +107,7 @@ def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list
             if isinstance(loaded, np.lib.npyio.NpzFile):
                 if not loaded.files:
                     raise RecordingError(f"{path}: is an archive without an array")
-                members = {name: loaded[name] for name in loaded.files}
+                members = {name: _member(loaded, name) for name in loaded.files}
                 strange = [name for name, member in members.items() if isinstance(member, bytes)]
                 if strange:
                     raise RecordingError(f"{path}: is an archive of {strange[0]}, which is no array; unpack it first")
@@ -121,6 +118,16 @@ def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list
             raise RecordingError(_pickled(path)) from error
         raise RecordingError(f"{path}: is not an array of numbers: {text}") from error
     return read_array(loaded, options, str(path), findings=findings)
+
+
+def _member(archive: Any, name: str) -> Any:
+    """Return an array of an archive; an empty one in the place of pickled objects that nobody needs."""
+    try:
+        return archive[name]
+    except ValueError:
+        if name.lower() in POSITION_MEMBERS or len(archive.files) == 1:
+            raise
+        return np.empty((0, 0))
 
 
 # What a member of a file of several arrays is called if it holds positions, the likeliest first.
@@ -144,10 +151,9 @@ def read_members(
     axes = [axis for axis in POSITION_TARGETS if axis in lower and lower[axis].ndim == 2]
     if not fit and axes[:2] == ["x", "y"] and len({lower[axis].shape for axis in axes}) == 1:
         arrays["positions"], fit = np.stack([lower[axis] for axis in axes], axis=-1), ["positions"]
-    alone = fit or (len(arrays) == 1 and not re.search("vel|speed|acc|head|angle|orient", *lower))
-    chosen = options.map.get("position") or next((n for n in arrays if not fit or n.lower() == fit[0]), "") * bool(
-        alone
-    )
+    alone = len(arrays) == 1 and not re.search("vel|speed|acc|head|angle|orient", "".join(lower))
+    likely = [name for name in arrays if (name.lower() == fit[0] if fit else alone)]
+    chosen = options.map.get("position") or "".join(likely[:1])
     options.used.update({"map position"} if "position" in options.map else ())
     if chosen not in arrays:
         why = f"has no array {chosen}" if chosen else "has several arrays, of which none is called positions"

@@ -243,8 +243,7 @@ UNUSED = {
     "fps": "column {t} counts no frames; if it does, write --time-unit frames as well",
     "keypoint": "no file has keypoints",
     "axes": "arrays, fixes and logs that say which axes theirs are stay as they are",
-    "decimal": "no file is a text",
-    "delimiter": "no file is a text",
+    **dict.fromkeys(("decimal", "delimiter"), "no file is a text"),
 }
 
 
@@ -431,8 +430,8 @@ READERS: dict[str, tuple[str, Reader]] = {
     ".tlog": ("MAVLink telemetry", flight_logs.read_tlog),
     ".log": ("log of a node on board", flight_logs.read_node_log),
     ".nc": ("movement netCDF", array_readers.read_netcdf),
-    ".h5": ("movement or idtracker.ai HDF5", array_readers.read_netcdf),
-    ".hdf5": ("movement or idtracker.ai HDF5", array_readers.read_netcdf),
+    ".h5": ("movement, idtracker.ai or SLEAP HDF5", array_readers.read_netcdf),
+    ".hdf5": ("movement, idtracker.ai or SLEAP HDF5", array_readers.read_netcdf),
     ".npy": ("NumPy array", array_readers.read_npy),
     ".npz": ("NumPy arrays", array_readers.read_npy),
     ".mat": ("MATLAB arrays", array_readers.read_mat),

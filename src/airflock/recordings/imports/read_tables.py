@@ -445,15 +445,14 @@ def _line_of_names(lines: list[str], delimiter: str, options: ImportOptions) -> 
     words = re.compile(r"[^\W\d]\w*")
     mapped = {word for text in options.map.values() if text != "file" for word in words.findall(text)}
     for i in range(first, min(first + MOST_ABOVE, len(lines))):
-        names = _cells(lines[i], delimiter or _delimiter(lines[i], lines[i + 1 : i + 2]))
+        names = _cells(lines[i], delimiter or _delimiter(lines[i], lines[i + 1 : i + 2]))[: MAX_COLUMNS + 1]
         targets = {meaning.target for meaning in map(table_columns.header_meaning, names) if meaning}
         places = targets & {"x", "lat"} or set(wide_columns(names))
         if (targets & {"t", "utc", "frame"} and places) or (mapped and mapped <= set(words.findall(lines[i]))):
             return i
     counted = re.match(r'"?Number of header lines:"?[;,\t]"?(\d+)', "".join(lines[first : first + 1]))
-    return (
-        min(int(counted[1]) - 2, len(lines)) if counted else first
-    )  # of EthoVision, whose last two are names and units
+    # EthoVision says how many lines stand above; the last two of them are names and units.
+    return min(int(counted[1]) - 2, len(lines)) if counted else first
 
 
 def _rows_of_units(body: list[str], delimiter: str) -> int:
