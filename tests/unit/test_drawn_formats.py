@@ -743,7 +743,7 @@ def test_advice_that_is_followed_ends_right(tmp_path, name):
             except RecordingError as error:
                 found = None
                 line = str(error).splitlines()[0]
-                print(line)
+                print(line)  # noqa: T201
                 knows = "--axes ned if x is north" in line and hasattr(truth, "x_is_north")
                 options = {"axes": "ned"} if knows else followed(line, options)
         assert found is not None
@@ -779,7 +779,9 @@ def sources(tmp_path):
     with h5py.File(tmp_path / "t.h5", "w") as file:
         file["trajectories"] = place
     metres.to_parquet(tmp_path / "a.parquet")
+    log = KINDS["dataflash_of_a_plane"](np.random.default_rng(2), tmp_path)[1]
     return {
+        "bin": (log, {}),
         "csv": (csv(tmp_path, metres), {}),
         "csv of bare numbers": (csv(tmp_path, metres.rename(columns={"x_m": "x", "y_m": "y"}), "bare.csv"), {}),
         "csv of frames": (csv(tmp_path, frames, "frames.csv"), {"fps": 10.0, "scale": 0.01}),
@@ -805,9 +807,12 @@ VALUES = {
 
 
 # Options that say what the file says as well.
-AGREES = {("csv of frames", "unit", "px"), ("csv of fixes", "axes", "enu")} | {
-    (name, "time_unit", "frames") for name in ("csv of frames", "array", "npy", "npz", "mat", "idtracker")
-}
+AGREES = {
+    ("csv of frames", "unit", "px"),
+    ("csv of fixes", "axes", "enu"),
+    ("bin", "axes", "enu"),
+    ("bin", "bridge", 0.0),
+} | {(name, "time_unit", "frames") for name in ("csv of frames", "array", "npy", "npz", "mat", "idtracker")}
 
 
 @pytest.mark.parametrize("option", VALUES)

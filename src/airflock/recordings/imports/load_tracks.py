@@ -264,7 +264,7 @@ def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
     """Leave out rows whose time lies far off both neighbours, which agree, or years off all others; note the rows."""
     time, steps = track.time, np.diff(track.time)
     usual = float(np.median(np.abs(steps))) if len(steps) > 3 else 0.0
-    if not usual or (0.0 <= steps.min() and steps.max() <= 20.0 * usual):
+    if not usual or (steps.min() >= 0.0 and steps.max() <= 20.0 * usual):
         return
     ahead, behind = time[1:-1] - time[:-2], time[2:] - time[1:-1]
     lone = (np.minimum(np.abs(ahead), np.abs(behind)) > 20.0 * usual) & (np.abs(ahead + behind) < 20.0 * usual)
@@ -315,13 +315,16 @@ def _question_lengths(tracks: list[ImportedTrack], findings: ImportReport) -> No
 def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:
     """Cut tracks to a window of time, s; leave out those without a row in it."""
     low, high = -np.inf if begin is None else begin, np.inf if end is None else end
+    first, last = min(track.time[0] for track in tracks), max(track.time[-1] for track in tracks)
     # The tolerance of the grid, so that a frame exactly on the border is not lost by rounding.
     for track in tracks:
         late = resampling.grid_tolerance(track_checks.median_period(track), *track.time[[0, -1]])
         track.keep((track.time >= low - late) & (track.time <= high + late))
     there = [track for track in tracks if len(track.time)]
     if not there:
-        raise RecordingError(f"no rows between {low:g} and {high:g} s")
+        raise RecordingError(
+            f"no rows between {low:g} and {high:g} s; --begin and --end must overlap {first:.10g} to {last:.10g} s"
+        )
     return there
 
 
