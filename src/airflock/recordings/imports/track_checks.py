@@ -470,7 +470,7 @@ def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64]
 class AxisCorrelation(NamedTuple):
     """Correlation of displacements (rows) with velocities (columns), by axis.
 
-    lively : (axis,) whether the velocity along it varies enough to compare
+    lively : (axis,) whether the motion along it varies enough to compare, and more than the noise of the positions
     r      : (axis, axis) correlation
     slopes : (axis,) by how many times the displacement along it changes as the velocity says
     """
@@ -486,7 +486,9 @@ def _likeness(moved: Array, summed: Array) -> AxisCorrelation:
     with np.errstate(invalid="ignore", divide="ignore"):
         cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
         r, slopes = np.nan_to_num(cross / np.outer(spread, strength)), np.diag(cross) / strength**2
-    return AxisCorrelation(strength > 0.05 * strength.max(), r, slopes)
+    # What no velocity explains is noise: below it a drone that stands shows no unit and no axis.
+    noise = spread * np.sqrt(np.clip(1.0 - np.abs(r).max(axis=1) ** 2, 0.0, 1.0))
+    return AxisCorrelation((strength > 0.05 * strength.max()) & (spread > noise.max()), r, slopes)
 
 
 def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, findings: ImportReport) -> None:
