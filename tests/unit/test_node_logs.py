@@ -71,6 +71,54 @@ def test_places_told_again_are_one_row(tmp_path):
     assert np.median(np.diff(found["time"].values)) == pytest.approx(0.2)
 
 
+def flown_at_two_clocks(path, seed, radius=20.0, speed=4.0):
+    """The log of a node whose autopilot sends its position 20 times a second while it ticks 20 times a second.
+
+    The autopilot's clock is 300 ppm fast, and a message is up to 30 ms late: now and then a tick sees nothing new, and
+    the next one two steps. Measured so on ArduCopter 4.6.0-dev in software in the loop.
+    """
+    from pymavlink.dialects.v20 import common as dialect
+
+    random, lines = np.random.default_rng(seed), []
+    node = Node(CARD, 1, KEY, now=50.0, utc=UTC, memory=NodeMemory(), radios=(0.2,))
+    logged = LoggingNode(node, lines.append, now=50.0, memory=NodeMemory(), radios=(0.2,))
+    source = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    site = CARD.site
+    lat, lon, height = (round(value * factor) for value, factor in zip(site.origin, (1e7, 1e7, 1e3), strict=True))
+    logged.autopilot(bytes(dialect.MAVLink_gps_global_origin_message(lat, lon, height).pack(source)), 50.0)
+    events = [(50.0 + 0.05 * k + random.uniform(0.0, 0.004), None) for k in range(600)]
+    for k in range(600):
+        held = 50.0 + 0.0501 * k * (1.0 - 3e-4)
+        a = speed / radius * (held - 50.0)
+        ned = radius * np.cos(a), radius * np.sin(a), -30.0
+        velocity = -speed * np.sin(a), speed * np.cos(a), 0.0
+        data = dialect.MAVLink_local_position_ned_message(700_000 + round(50.1 * k), *ned, *velocity).pack(source)
+        events.append((held + random.uniform(0.0, 0.03), bytes(data)))
+    for now, data in sorted(events, key=lambda event: event[0]):
+        if data is None:
+            logged.tick(now)
+        else:
+            logged.autopilot(data, now)
+    rows = [json.loads(line) for line in lines]
+    flown = [row | {"phase": "FLOCK", "set": [0.0, 1.0, 0.0]} if "out" in row else row for row in rows]
+    path.write_text("\n".join(json.dumps(row) for row in flown) + "\n")
+    (path.parent / "ticks.log").write_text("\n".join(json.dumps(row) for row in flown if "a" not in row) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(("name", "off"), [("mission-1.log", 0.05), ("ticks.log", 0.1)])
+def test_rows_have_the_time_of_their_states_and_not_that_of_the_tick(tmp_path, seed, name, off):
+    """By the autopilot's bytes, and without them by the steps themselves; the clocks alone make jumps of 0.2 m."""
+    flown_at_two_clocks(tmp_path / "mission-1.log", seed)
+    found = airflock.load_tracks(tmp_path / name, precision=64)
+    place = found["position"].values[:, :2, 0, 0]
+    sure = np.isfinite(place[:, 0])
+    angle = np.unwrap(np.arctan2(place[sure, 0], place[sure, 1]))
+    ahead = 20.0 * angle - 4.0 * found["time"].values[sure]  # m along the circle, but for one delay of all
+    assert sure.mean() > 0.98 and np.ptp(ahead) < 2.0 * off
+    assert np.nanmax(np.abs(np.linalg.norm(found["velocity"].values[:, :, 0, 0], axis=1) - 4.0)) < 0.01
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -10,11 +10,22 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from airflock.core import State
+from airflock.drones.mavlink.frames import FrameStream, MavlinkFrame
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import Node, NodeMemory, NodeOutput
+from airflock.drones.onboard.peers import AUTOPILOT_COMPONENT
 from airflock.drones.onboard.steering import Velocity
-from airflock.support import FormatError, LinkError, TextError, as_error, parse_json, parse_json_object, read_text
+from airflock.support import (
+    FormatError,
+    LinkError,
+    TextError,
+    as_error,
+    parse_json,
+    parse_json_object,
+    read_text,
+    swap_enu_ned,
+)
 
 LOG_VERSION = 1
 MAX_RADIOS = 16
@@ -77,9 +88,11 @@ class ReplayedTick(NamedTuple):
 
 
 class LoggedTick(NamedTuple):
-    """One tick in a log: line, time of the own clock (s), phase, own state, and command (m/s).
+    """One tick in a log: line, time of the own clock (s), phase, own state, command (m/s), and stamp of the state.
 
-    own : x, y, z (m), vx, vy, vz (m/s); None where the node did not know its state
+    own   : x, y, z (m), vx, vy, vz (m/s); None where the node did not know its state
+    stamp : arrival of the state (s of the own clock) and the autopilot's time of it since boot (s); None where the
+            autopilot's bytes since the tick before do not hold it
     """
 
     line: int
@@ -87,6 +100,7 @@ class LoggedTick(NamedTuple):
     phase: MissionPhase
     own: State | None
     command: Velocity
+    stamp: tuple[float, float] | None = None
 
 
 class LogTicks(NamedTuple):
@@ -108,16 +122,31 @@ def read_log_ticks(path: Path) -> LogTicks:
                 begun, utc, member = _numbers_or_none([head.get("now")], 1), head.get("utc"), head.get("member")
                 if head.get("log") != LOG_VERSION or begun is None or type(utc) is not int or type(member) is not int:
                     raise LinkError("this is not a log of a flight on board")
-                ticks, before = [], begun[0]
+                ticks, before, stream = [], begun[0], FrameStream()
+                stamps: dict[tuple[float, float, float], tuple[float, float]] = {}
                 for number, row in rows:
-                    before, _ = _time_and_bytes(row, number, before)
+                    before, data = _time_and_bytes(row, number, before)
+                    if "a" in row:
+                        for frame in stream(data):
+                            if (frame.system, frame.component) == (member, AUTOPILOT_COMPONENT):
+                                _stamp(frame, before, stamps)
                     if "out" in row:
-                        ticks.append(_tick(row, number, before))
+                        tick = _tick(row, number, before)
+                        ticks.append(tick._replace(stamp=None if tick.own is None else stamps.get(tick.own[3:])))
+                        stamps.clear()
                 return LogTicks(member, begun[0], utc, ticks)
         except LinkError as error:
             raise LinkError(f"{path}: {error}") from error
         except UnicodeDecodeError as error:
             raise LinkError(f"{path}: this is not a log of a flight on board") from error
+
+
+def _stamp(frame: MavlinkFrame, now: float, stamps: dict[tuple[float, float, float], tuple[float, float]]) -> None:
+    """Keep arrival and time since boot of an own state, by its velocity: a state has one, a tick does not name it."""
+    factor = {32: 1.0, 33: 0.01}.get(frame.message)
+    if factor is not None:
+        v = frame.values()
+        stamps[swap_enu_ned(*(factor * v[key] for key in ("vx", "vy", "vz")))] = now, v["time_boot_ms"] * 1e-3
 
 
 def _tick(row: Mapping[str, Any], number: int, now: float) -> LoggedTick:

@@ -196,15 +196,21 @@ def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: Import
 def to_utc(track: ImportedTrack) -> float:
     """Replace own time by UTC, by a straight line through the pairs; returns the largest residual, s."""
     assert track.utc is not None
-    own, utc = track.utc.T
+    track.time, residual = on_other_clock(track.time, *track.utc.T)
+    track.clock = "utc"
+    return residual
+
+
+def on_other_clock(
+    times: NDArray[np.float64], own: NDArray[np.float64], other: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """Return times on another clock, by a straight line through readings of both; and the largest residual, s."""
     centre = own.mean()
-    offset = utc - own
+    offset = other - own
     ahead = offset - offset.mean()
     spread = float(((own - centre) ** 2).sum())
     # a drift only shows over minutes: quartz drifts by 1e-5, a packet of the receiver is late
     # by 0.1 s
     drift = float((ahead * (own - centre)).sum() / spread) if own.max() - own.min() > 60.0 else 0.0
     residual = ahead - drift * (own - centre)
-    track.time = track.time + offset.mean() + drift * (track.time - centre)
-    track.clock = "utc"
-    return float(np.abs(residual).max())
+    return times + offset.mean() + drift * (times - centre), float(np.abs(residual).max())

@@ -1,13 +1,16 @@
 """Read flight logs: PX4 ULog, ArduPilot DataFlash, MAVLink telemetry, and logs of nodes on board."""
 
+import itertools
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airflock.drones import AIRBORNE_PHASES, FLYING_PHASES, read_log_ticks
+from airflock.recordings.imports.common_frame import on_other_clock
 from airflock.recordings.imports.table_columns import invalid_note, px4_origin
 from airflock.recordings.imports.track import (
     COMMAND_TARGETS,
@@ -50,12 +53,12 @@ def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
     columns = _enu({axis: local[axis] for axis in NED[0]}, POSITION_TARGETS) | _enu(
         {a: local[a] for a in NED[1]}, VELOCITY_TARGETS
     )
-    columns |= _command(topics.get(SETPOINT), time, path, findings)
     valid = np.ones(len(time), bool)
     for flag in ("xy_valid", "v_xy_valid"):
         valid &= local[flag].astype(bool) if flag in local else True
     labels = {"x": "y", "y": "x", "z": "-z", "vx": "vy", "vy": "vx", "vz": "-vz"}
     found = ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels, "boot", datum="amsl")
+    _add_commands(found, *_setpoints(topics.get(SETPOINT)), findings, f"{SETPOINT} (velocities)")
     if "xy_reset_counter" in local:
         found.breaks = np.flatnonzero(np.diff(local["xy_reset_counter"].astype(np.int64)) != 0) + 1
         if found.breaks.size:
@@ -76,20 +79,13 @@ def _enu(ned: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     return {names[0]: east, names[1]: north, names[2]: -down}
 
 
-def _command(topic: Any, time: Any, path: Path, findings: ImportReport) -> dict[str, Any]:
-    """Return the velocity set-point, constant until the next one; nan where the position was controlled instead."""
+def _setpoints(topic: Any) -> tuple[Any, Any]:
+    """Return times (s) and velocities east, north, up (m/s); nan where the position was controlled instead."""
     if topic is None:
-        findings.notes.append(f"{path}: has no {SETPOINT}: no commands")
-        return {}
+        return np.empty(0), np.empty((0, 3))
     new = "velocity[0]" in topic  # PX4 from 1.13
     parts = {axis: topic[f"velocity[{c}]" if new else f"v{axis}"] for c, axis in enumerate("xyz")}
-    ask = _enu(parts, COMMAND_TARGETS)
-    at = np.searchsorted(topic["timestamp"] * 1e-6, time, side="right") - 1
-    held = {name: np.where(at >= 0, values[np.maximum(at, 0)], np.nan) for name, values in ask.items()}
-    share = float(np.isnan(held["cx"]).mean()) if len(time) else 1.0
-    if share > 0.0:
-        findings.notes.append(f"{path}: {share:.0%} of the time no velocity was commanded")
-    return held if share < 1.0 else {}
+    return topic["timestamp"] * 1e-6, np.stack([*_enu(parts, COMMAND_TARGETS).values()], axis=1)
 
 
 def _utc(topic: Any) -> Any:
@@ -112,13 +108,21 @@ def _air(topic: Any, time: Any) -> Any:
 # in a process of its own (`reader_process`): pymavlink loops without end in some damaged logs.
 PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
 PACE = 1e5  # bytes per second; read by Python, row by row
+VELOCITY_SUBMODE = 4  # GUIP.Type of a velocity; others control a position, an acceleration or an attitude
+GIVEN_UP = 3.0  # s after which GUIDED mode gives up a velocity; source: ArduPilot, GUID_TIMEOUT
 HEAD = b"\xa3\x95"  # of each message; source: ArduPilot, AP_Logger/LogStructure.h
+VELOCITY_IGNORED = 8 + 16 + 32  # bits of a type mask; source: MAVLink, POSITION_TARGET_TYPEMASK
+REBOOT = 2.0  # s by which time since boot goes back only after a boot; messages overtake each other by less
 GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970
 LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so that it cannot part them
 
 
 def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
+    """Read a DataFlash log: PSCN, PSCE, PSCD (position, velocity), GUIP (commanded velocity), ORGN and GPS.
+
+    TVN, TVE, TVD are no commands: they are what the position controller makes of GUIP within its limits of acceleration
+    and jerk, so that a response to them looks eight times as quick as that to a command.
+    """
     _need_pymavlink(path)
     with path.open("rb") as file:
         if file.read(len(HEAD)) != HEAD:
@@ -129,6 +133,8 @@ def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -
         return [_estimated(path, findings)]
     found = _joined(rows, path)
     found.clock, found.datum = "boot", "amsl"
+    guided = contents["GUIP"].values if "GUIP" in contents else np.empty((0, 6))
+    _add_commands(found, guided[:, 2] * 1e-6, _guided_velocities(guided), findings, "GUIP (velocities in GUIDED mode)")
     if "ORGN" in contents:
         latitude, longitude, height = (float(value) for value in contents["ORGN"].values[-1])
         found.origin = (latitude, longitude, height)
@@ -182,57 +188,95 @@ def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
     north, east, down = rows["PSCN"], rows["PSCE"], rows.get("PSCD")
     time = north[:, 0] * 1e-6
 
-    # States are interpolated to the times of the north axis; a command is constant until the next
-    # one.
     def at(table: Any, column: int) -> Any:
         return np.interp(north[:, 0], table[:, 0], table[:, column])
 
-    def held(table: Any) -> Any:
-        place = np.searchsorted(table[:, 0], north[:, 0], side="right") - 1
-        return table[np.maximum(place, 0), 3]
-
     columns = {"x": at(east, 1), "y": north[:, 1], "vx": at(east, 2), "vy": north[:, 2]}
-    columns |= {"cx": held(east), "cy": north[:, 3]}
     if down is not None:
-        columns |= {"z": -at(down, 1), "vz": -at(down, 2), "cz": -held(down)}
+        columns |= {"z": -at(down, 1), "vz": -at(down, 2)}
     columns = {
-        k: columns[k]
-        for k in (*POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS)
-        if k in columns and np.isfinite(columns[k]).any()
+        k: columns[k] for k in (*POSITION_TARGETS, *VELOCITY_TARGETS) if k in columns and np.isfinite(columns[k]).any()
     }
     labels = {"x": "PSCE.PE", "y": "PSCN.PN", "z": "-PSCD.PD", "vx": "PSCE.VE", "vy": "PSCN.VN", "vz": "-PSCD.VD"}
     return ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels)
 
 
+def _guided_velocities(guided: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return velocities east, north, up (row, 3), m/s, of GUIP; nan where it controls something else."""
+    metres, kind, (north, east, third) = guided[:, 0], guided[:, 1], guided[:, 3:].T
+    # Logs in m/s are north-east-down, those in cm/s (Copter to 4.6) north-east-up: measured in a climb.
+    velocity = np.stack([east, north, np.where(metres, -third, third)], axis=1) * np.where(metres, 1.0, 0.01)[:, None]
+    return np.where((kind == VELOCITY_SUBMODE)[:, None], velocity, np.nan)
+
+
+def _add_commands(track: ImportedTrack, at: Any, commands: Any, findings: ImportReport, name: str) -> None:
+    """Add the command in force at each row: the last one, unless it is so old that the autopilot has given it up.
+
+    at, commands : times (s, of the track's clock) and velocities east, north, up (m/s); name : of these messages
+    """
+    order = np.argsort(at, kind="stable")
+    at, last = at[order], np.searchsorted(at[order], track.time, side="right") - 1
+    # A stream that stops has ended long before the time-out: take-off and landing are no "0 m/s".
+    longest = min(GIVEN_UP, 5.0 * float(np.median(np.diff(at)))) if len(at) > 1 else GIVEN_UP
+    held = np.full((len(track.time), 3), np.nan)
+    if len(at):
+        there = (last >= 0) & (track.time - at[last] <= longest)
+        held[there] = commands[order][last[there]]
+    share = float(np.isnan(held[:, 0]).mean())
+    if share > 0.0:
+        note = f"{share:.0%} of the time without {name}: no commands there"
+        findings.notes.append(f"{track.source}: {track.name}: {note}")
+    if share < 1.0:
+        track.columns |= dict(zip(COMMAND_TARGETS, held.T, strict=True))
+
+
 def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
 
-    All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
+    All vehicles share the receiver's clock; a row is put on it by the vehicle's own time, `time_boot_ms`, not by its
+    arrival. Positions are about their own origins.
     """
     _need_pymavlink(path)
     contents = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
     if "LOCAL_POSITION_NED" not in contents:
         raise RecordingError(f"{path}: has no LOCAL_POSITION_NED; import the vehicles' own logs instead")
-    states = _by_vehicle(contents, "LOCAL_POSITION_NED", (0, 2, 1, 3, 5, 4, 6), (1, 1, 1, -1, 1, 1, -1))
-    wishes = _by_vehicle(contents, "POSITION_TARGET_LOCAL_NED", (0, 2, 1, 3), (1, 1, 1, -1))
+    states = _by_vehicle(contents, "LOCAL_POSITION_NED", (0, 1, 3, 2, 4, 6, 5, 7), (1, 1e-3, 1, 1, -1, 1, 1, -1))
+    wishes = _by_vehicle(contents, "POSITION_TARGET_LOCAL_NED", (0, 1, 4, 3, 5, 2), (1, 1e-3, 1, 1, -1, 1))
     origins = _by_vehicle(contents, "GPS_GLOBAL_ORIGIN", (1, 2, 3), (1e-7, 1e-7, 1e-3))
     found = []
     for who, table in sorted(states.items()):
-        columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), table.T[1:].copy(), strict=True))
-        if who in wishes:
-            ask = wishes[who]
-            at = np.searchsorted(ask[:, 0], table[:, 0], side="right") - 1
-            columns |= {
-                n: np.where(at >= 0, ask[np.maximum(at, 0), c + 1], np.nan) for c, n in enumerate(COMMAND_TARGETS)
-            }
-        track = ImportedTrack(
-            f"vehicle_{who}", str(path), table[:, 0], columns, np.arange(len(table)), {}, "utc", datum="amsl"
-        )
+        # Two links to one receiver, or a router, bring the same message twice.
+        rows = np.sort(np.unique(table[:, 1:], axis=0, return_index=True)[1])
+        table, ask = table[rows], wishes.get(who, np.empty((0, 6)))
+        both = np.concatenate([table[:, :2], ask[:, :2]])
+        order = np.argsort(both[:, 0], kind="stable")
+        time = np.empty(len(both))
+        time[order] = state_times(*both[order].T)
+        columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), table.T[2:].copy(), strict=True))
+        track = ImportedTrack(f"vehicle_{who}", str(path), time[: len(rows)], columns, rows, {}, "utc", datum="amsl")
+        track.breaks = np.flatnonzero(np.diff(table[:, 1]) < -REBOOT) + 1
+        velocity = np.where((ask[:, 5].astype(int) & VELOCITY_IGNORED == 0)[:, None], ask[:, 2:5], np.nan)
+        _add_commands(track, time[len(rows) :], velocity, findings, "POSITION_TARGET_LOCAL_NED (velocities)")
         if who in origins:
             latitude, longitude, height = (float(value) for value in origins[who][-1])
             track.origin = (latitude, longitude, height)
         found.append(track)
     return found
+
+
+def state_times(arrival: NDArray[np.float64], boot: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Put the times of states, s since boot, on the clock that they arrived by; in order of arrival.
+
+    Arrivals scatter by a period of the link, which would look like jumps of a drone that flies: between two boots both
+    clocks go by one straight line.
+    """
+    time = arrival.copy()
+    edges = [0, *(np.flatnonzero(np.diff(boot) < -REBOOT) + 1), len(boot)]
+    for begin, end in itertools.pairwise(edges):
+        own = boot[begin:end]
+        if len(own) and np.ptp(own) > 0.0:  # an autopilot that does not count has its arrivals
+            time[begin:end] = on_other_clock(own, own, arrival[begin:end])[0]
+    return time
 
 
 def _by_vehicle(contents: Any, kind: str, columns: tuple[int, ...], factors: tuple[float, ...]) -> dict[int, Any]:
@@ -244,14 +288,18 @@ def _by_vehicle(contents: Any, kind: str, columns: tuple[int, ...], factors: tup
 
 
 def read_dataflash_arrays(path: str, _: int, share: OnShare) -> Contents:
-    """Read tables of time (µs), position, velocity, commanded velocity of each axis; of origins; of GPS times."""
+    """Read tables of time (µs), position and velocity of each axis; of commands; of origins; of GPS times."""
     from pymavlink import DFReader
 
-    fields: dict[str, tuple[str, ...]] = {
-        part: ("TimeUS", f"P{part[-1]}", f"V{part[-1]}", f"TV{part[-1]}") for part in PARTS
-    }
+    fields: dict[str, tuple[str, ...]] = {part: ("TimeUS", f"P{part[-1]}", f"V{part[-1]}") for part in PARTS}
     fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": ("TimeUS", "GWk", "GMS", "I")}
-    return _tables(DFReader.DFReader_binary(path), fields, lambda message: [], share)
+    fields |= {"GUIP": ("Type", "TimeUS", "vX", "vY", "vZ")}
+
+    def source(message: Any) -> list[float]:
+        """Return 1 for a command in m/s, 0 for one in cm/s; a log without units is an early one."""
+        return [float(message.fmt.get_unit("vX") == "m/s")] if message.get_type() == "GUIP" else []
+
+    return _tables(DFReader.DFReader_binary(path), fields, source, share)
 
 
 def read_estimate_arrays(path: str, _: int, share: OnShare) -> Contents:
@@ -267,12 +315,12 @@ def read_estimate_arrays(path: str, _: int, share: OnShare) -> Contents:
 
 
 def read_telemetry_arrays(path: str, _: int, share: OnShare) -> Contents:
-    """Read tables of vehicle, time (s) and six numbers of states, three of commands and of origins."""
+    """Read tables of vehicle, arrival (s), and numbers of states, of commands and of origins."""
     from pymavlink import mavutil
 
     fields = {
-        "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
-        "POSITION_TARGET_LOCAL_NED": ("vx", "vy", "vz"),
+        "LOCAL_POSITION_NED": ("time_boot_ms", "x", "y", "z", "vx", "vy", "vz"),
+        "POSITION_TARGET_LOCAL_NED": ("time_boot_ms", "type_mask", "vx", "vy", "vz"),
         "GPS_GLOBAL_ORIGIN": ("latitude", "longitude", "altitude"),
     }
 
@@ -307,14 +355,17 @@ def _need_pymavlink(path: Path) -> None:
 
 # Logs that nodes write on board: place and velocity from the autopilot, and the commands of the
 # node.
+RECKONED_SPEED = 0.5  # m/s; slower, a step says nothing of the time
+CLOCK_GAIN = 0.05  # share of the difference to the ticks that each row takes back: over a second at 20 Hz
 OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs end in .log, too
 
 
 def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read the log of a node on board: local east-north-up of its mission, by the clock of its computer.
 
-    A row is a tick at which the own state was another than at the tick before; between such rows the autopilot had said
-    nothing new. Commands are those of phases in which the node flies; the log's first line relates their clock to UTC.
+    A row is a tick at which the own state was another than at the tick before, at the time at which the state held, not
+    that of the tick. Commands are those of phases in which the node flies; the log's first line relates their clock to
+    UTC.
     """
     with open(path, "rb") as file:
         if not file.read(8).startswith(b'{"log":'):
@@ -329,16 +380,16 @@ def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) ->
     if not rows:
         raise RecordingError(f"{path}: the autopilot never told where it is")
     ticks = [log.ticks[k] for k in rows]
-    time = np.array([tick.time for tick in ticks])
-    flown = np.array([tick.phase in FLYING_PHASES for tick in ticks])
     place = np.array([tick.own for tick in ticks], float)
-    command = np.where(flown[:, None], np.array([tick.command for tick in ticks], float), np.nan)
-    columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), place.T, strict=True)) | dict(
-        zip(COMMAND_TARGETS, command.T, strict=True)
-    )
-    if not flown.any():
-        findings.notes.append(f"{path}: the node never flew: no commands")
-        columns = {name: column for name, column in columns.items() if name not in COMMAND_TARGETS}
+    stamps = np.array([tick.stamp or (np.nan, np.nan) for tick in ticks])
+    seen, known = np.array([tick.time for tick in ticks]), np.isfinite(stamps[:, 0])
+    if known.any():
+        time = seen.copy()
+        time[known] = state_times(*stamps[known].T)
+        time[~known] -= np.median(seen[known] - time[known])
+    else:
+        time = reckoned_times(seen, place)
+    columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), place.T, strict=True))
     labels = {name: f"own[{c}]" for c, name in enumerate((*POSITION_TARGETS, *VELOCITY_TARGETS))}
     labels |= {name: f"set[{c}]" for c, name in enumerate(COMMAND_TARGETS)}
     found = ImportedTrack(
@@ -351,7 +402,33 @@ def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) ->
         "boot",
         datum="home",
     )
+    flown = np.array([tick.phase in FLYING_PHASES for tick in log.ticks])
+    if flown.any():
+        commands = np.where(flown[:, None], np.array([tick.command for tick in log.ticks]), np.nan)
+        at = np.array([tick.time for tick in log.ticks])
+        _add_commands(found, at, commands, findings, "a node that flies")
+    else:
+        findings.notes.append(f"{path}: the node never flew: no commands")
     ends = time[[0, -1]]
     found.utc = np.stack([ends, log.utc * 1e-6 + ends - log.now], axis=1)
     found.in_air = np.array([tick.phase in AIRBORNE_PHASES for tick in ticks])
     return [found]
+
+
+def reckoned_times(seen: NDArray[np.float64], states: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return when states (row, 6) held that were seen at ticks (s) of another clock than that of the states.
+
+    Two clocks of 20 Hz: now and then a tick sees nothing new, and the next one two steps. Position and velocity of a
+    drone that flies say how long a step took; the ticks keep the sum of the steps from running away.
+    """
+    moved, speed = np.diff(states[:, :3], axis=0), 0.5 * (states[1:, 3:] + states[:-1, 3:])
+    square, passed = (speed**2).sum(axis=1), np.diff(seen)
+    took = np.where(square > RECKONED_SPEED**2, (moved * speed).sum(axis=1) / np.maximum(square, 1e-9), passed)
+    # More than a tick and a half is no matter of clocks, but a jump, which the checks must see.
+    most = 1.5 * float(np.median(passed)) if len(passed) else 0.0
+    ahead, found = 0.0, seen.copy()
+    for k, (step, between) in enumerate(zip(took, passed, strict=True), 1):
+        ahead = (1.0 - CLOCK_GAIN) * (ahead + step - between)
+        ahead = ahead if abs(ahead) <= most else 0.0
+        found[k] += ahead
+    return found
