@@ -56,7 +56,7 @@ def fleet(seed, white, rate, duration, only_body):
     found = body.fit_body(logs, scenario.flight.dt, walk)
     row = {
         "seed": seed, "saturated": found.saturated_rows, "gain": found.gain, "second_tau": found.second_tau,
-        "white": found.value["white"], "dead_time": found.command_delay,
+        "white": found.value["white"], "dead_time": found.value["delay"],
     }  # fmt: skip
     rows = {key: (found.value[n], found.intervals[n], found.refused.get(n, "")) for n, key in KEYS.items()}
     row["seconds_body"] = time.process_time() - middle

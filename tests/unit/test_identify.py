@@ -121,18 +121,54 @@ def test_commands_that_the_vehicle_runs_ahead_of_are_no_lag():
     assert set(found.refused) >= {"tau", "a_max", "noise"}
 
 
-def test_late_commands_are_told():
-    logs, dt = fly(0.5, 4.0, 0.05, 0.05)
-    late = 6
+def late(logs, rows):
+    """The same logs if each command had been given some rows earlier: the body follows it so much later."""
     command = logs.command.copy()
     for who in range(logs.drones):
-        rows = logs.of(who)
-        command[rows[:-late]] = logs.command[rows[late:]]
-    from dataclasses import replace
+        own = logs.of(who)
+        command[own[:-rows]] = logs.command[own[rows:]]
+    return replace(logs, command=command)
 
-    found = body.fit_body(replace(logs, command=command), dt)
-    assert found.command_delay == pytest.approx(late * STEP, abs=STEP + 1e-9)
-    assert any("late" in note for note in found.notes)
+
+@pytest.mark.parametrize(
+    ("tau", "delay", "a_max"), [(1.2, 0.4, 1e4), (1.2, 0.4, 2.5), (0.5, 0.3, 4.0), (0.4, 1.0, 6.0)]
+)
+def test_delay_and_lag_of_a_body_come_back_apart(tau, delay, a_max):
+    """Of the response that was measured on ArduCopter, 0.40 s before a lag of 1.20 s, and of others."""
+    logs, dt = fly(tau, a_max, 0.05, 0.05, drones=2)
+    found = body.fit_body(late(logs, round(delay / STEP)), dt)
+    low, high = found.intervals["delay"]
+    assert found.value["delay"] == pytest.approx(delay, abs=0.02) and low - 0.01 < delay < high + 0.01
+    assert found.value["tau"] == pytest.approx(tau, rel=0.05)
+    assert not {"delay", "tau"} & set(found.refused)
+
+
+@pytest.mark.parametrize("size", [3.0, 8.0])
+def test_commands_that_act_at_once_have_no_delay_and_leave_the_lag_as_it_was(size):
+    logs, dt = fly(0.8, 4.0, 0.1, 0.1, size=size)
+    found = body.fit_body(logs, dt)
+    assert found.value["delay"] == 0.0 and 0.0 <= found.intervals["delay"][1] < 2.0 * STEP
+    assert found.value["tau"] == pytest.approx(0.8, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_delay_is_refused_or_right_where_a_flight_in_gusts_has_no_steps(seed):
+    """Of a body that turns once a minute or two, gusts tell the lag, but nothing tells the delay."""
+    g, tau, rows = np.random.default_rng(seed), 1.2, 8
+    time = STEP * np.arange(6000)
+    wish = 4.0 * np.stack([np.cos(0.05 * time), np.sin(0.05 * time)], axis=1)
+    speed = wish.copy()
+    for k in range(len(time) - 1):
+        pull = (wish[max(k - rows, 0)] - speed[k]) / tau
+        speed[k + 1] = speed[k] + STEP * pull + g.normal(0.0, np.sqrt(2.0 * 0.3 * STEP), 2)
+    seen = speed + g.normal(0.0, 0.1, speed.shape)
+    new = np.arange(len(time)) == 0
+    logs = FlightLogs(time, 0.0 * seen, seen, wish, np.zeros(len(time), int), new, ["d"], np.zeros(len(time), bool))
+    found = body.fit_body(logs)
+    low, high = found.intervals["delay"]
+    assert "fly velocity steps" in found.refused.get("delay", "") or low < rows * STEP < high
+    low, high = found.intervals["tau"]
+    assert "tau" in found.refused or low - 0.1 < tau < high + 0.1
 
 
 def test_words_of_arrays_are_the_words_of_the_engine():

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -34,7 +34,12 @@ def hessian(loss: Callable[[Any], float], z: NDArray[np.float64], step: float) -
 # an Ornstein-Uhlenbeck process below saturation and of a random walk above. Intervals come from the
 # curvature of the likelihood and the scatter of its slope between stretches of flight (Huber's
 # sandwich), so that they hold where the noise is not quite what the filter assumes.
+# A dead time before it shifts the commands by rows, also by parts of one.
 BODY_NAMES = ("tau", "a_max", "noise", "white")
+LATE_ROWS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)  # delays that are tried first, rows
+LATEST = 2.0  # s; our choice: beyond it is no dead time of a vehicle, but a law of its own
+NO_DELAY = 2.0  # rows; a delay that is surely shorter, and may be none, is none
+ROWS = 25.0  # rows in one unit of the delay that is sought, so that its steps compare with those of logarithms
 STARTS = ((0.7, 4.0, 0.1, 0.05), (0.25, 8.0, 0.3, 0.02))
 LIMITED = (0.5, 0.7, 0.85, 0.95, 0.99)  # shares of rows below the limit, from which a limit is sought, and
 SHORTER = (1.0, 0.92, 0.84, 0.7)  # shares of the first tau, which without a limit is too long
@@ -44,8 +49,8 @@ FREE = 1e4  # m/s^2: no limit
 WITHIN, NEWTON = 1.92, 3  # half of the 95 % point of chi-squared with 1 degree of freedom; steps of each fit on the way
 GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit for an a_max
 # The second estimator shares no noise with the first; where set-points run ahead of the vehicle
-# they disagree.
-DISAGREE = 0.15  # of two estimates of tau
+# they disagree. A jerk that is limited, as that of ArduCopter, parts them by 0.16: no reason to refuse.
+DIFFER, DISAGREE = 0.15, 0.3  # of two estimates of tau: from which on the interval has both, and none is right
 # Relative standard deviation of what the filter leaves out: commands come from the true velocity,
 # so they know more of it than the filter does, also one row after they are given (`_counted_rows`).
 # Measured on random fleets with 0.1 m/s of noise in the log (benchmarks/identify.py).
@@ -54,7 +59,7 @@ BEYOND = np.array([0.01, 0.01, 0.005, 0.005])
 
 @dataclass
 class BodyFit:
-    """Fit of the body: values and 95 % intervals by name.
+    """Fit of the body: values and 95 % intervals by name, those of `BODY_NAMES` and the delay of commands, s.
 
     refused : name → reason, for numbers that cannot be separated
     gain    : 2 Δ log-likelihood of a limited against an unlimited acceleration
@@ -69,7 +74,6 @@ class BodyFit:
     gain: float
     second_tau: float
     seen: float
-    command_delay: float
     gust_correlation: float
     notes: list[str]
 
@@ -142,34 +146,29 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
             "map what the log calls the commanded velocity: --map cx:=COLUMN --map cy:=COLUMN"
         )
         return _nothing(reason)
-    span = _blocks(flying)
-    out = np.zeros(int(span.max()) + 1)
-    arrays = (
-        flying.time,
-        np.ascontiguousarray(flying.velocity),
-        np.ascontiguousarray(flying.command),
-        flying.is_new,
-        _counted_rows(flying),
-        span,
-    )
-    kernel = _body_kernel()
-
-    def loss(z: Any, blocks: Any = None) -> float:
-        tau, a_max, noise, white = np.exp(z)
-        if not dt < 0.9 * tau or max(z) > 12.0 or min(z) < -14.0:
-            return 1e15
-        return float(kernel(*arrays, out if blocks is None else blocks, tau, a_max, noise, white, dt))
-
+    loss, blocks = _body_loss(flying, dt)
+    z = _lowest(loss, np.linalg.norm(flying.command - flying.velocity, axis=1))
+    later, later_spread, freedom = _fit_delay(flying, dt, z)
+    late, error = ROWS * later[4], 1.96 * ROWS * later_spread[4]
+    low_delay, high_delay = flying.step * max(late - error, 0.0), flying.step * max(late + error, 0.5)
+    # Less than none is sought, too, or an interval that begins at none would look sharp.
+    # No delay is the rule in simulation: then the fit is one without it, and as sharp as that.
+    late = 0.0 if late - error < 0.5 and late + error < NO_DELAY else max(late, 0.0)
+    if late:
+        flying = _delayed(flying, late)
+        loss, blocks = _body_loss(flying, dt)
+        z, spread = _refined(loss, later[:4]), later_spread[:4]
+    else:
+        spread, freedom = _body_errors(loss, z, blocks)
     gap = np.linalg.norm(flying.command - flying.velocity, axis=1)
-    z = _lowest(loss, gap)
     lowest = loss(z)
     value = dict(zip(BODY_NAMES, np.exp(z), strict=True))
-    spread, freedom = _body_errors(loss, z, len(out))
     wide = float(student.ppf(0.975, max(freedom, 1)))
     interval = {
         n: (float(np.exp(c - wide * s)), float(np.exp(c + wide * s)))
         for n, c, s in zip(BODY_NAMES, z, spread, strict=True)
     }
+    value["delay"], interval["delay"] = flying.step * late, (low_delay, high_delay)
     # The walk of the sensor's own error looks like outer noise in logged velocities, and its rate
     # is known.
     low, high = interval["noise"]
@@ -183,29 +182,78 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
     found = BodyFit(
         value, interval, {}, saturated, len(flying.time), 2.0 * (free - lowest),
         instrumental_tau(flying, value["tau"], value["a_max"]), seen,
-        0.0, gust_correlation(flying, value), [],
+        gust_correlation(flying, value), [],
     )  # fmt: skip
-    found.command_delay = command_delay(flying, value)
     _judge(found, flying)
     return found
 
 
 def _nothing(reason: str) -> BodyFit:
     nan = float("nan")
-    empty = dict.fromkeys(BODY_NAMES, nan)
-    return BodyFit(
-        empty,
-        dict.fromkeys(BODY_NAMES, (nan, nan)),
-        dict.fromkeys(BODY_NAMES, reason),
-        0,
-        0,
-        0.0,
-        nan,
-        0.0,
-        0.0,
-        0.0,
-        [],
-    )
+    names = (*BODY_NAMES, "delay")
+    refused = dict.fromkeys(names, reason)
+    return BodyFit(dict.fromkeys(names, nan), dict.fromkeys(names, (nan, nan)), refused, 0, 0, 0.0, nan, 0.0, 0.0, [])
+
+
+def _body_loss(logs: FlightLogs, dt: float, lead: int = 0) -> tuple[Callable[..., float], int]:
+    """Return the negative log-likelihood of the log parameters, and its number of blocks; a fifth number is the delay.
+
+    lead : rows at the start of each stretch that do not count, since the commands before them are unknown
+    """
+    span = _blocks(logs)
+    out = np.zeros(int(span.max()) + 1)
+    rows, velocity = np.arange(len(logs.time)), np.ascontiguousarray(logs.velocity)
+    counted = _counted_rows(logs) & (rows - _stretches(logs)[0] >= lead)
+    kernel = _body_kernel()
+
+    def loss(z: Any, blocks: Any = None) -> float:
+        tau, a_max, noise, white = np.exp(z[:4])
+        late = ROWS * z[4] if len(z) > 4 else 0.0
+        if not dt < 0.9 * tau or max(z[:4]) > 12.0 or min(z[:4]) < -14.0 or abs(late) > LATEST / logs.step:
+            return 1e15
+        acting = logs.command if late == 0.0 else _late_commands(logs, late)
+        arrays = (logs.time, velocity, np.ascontiguousarray(acting), logs.is_new, counted, span)
+        return float(kernel(*arrays, out if blocks is None else blocks, tau, a_max, noise, white, dt))
+
+    return loss, len(out)
+
+
+def _stretches(logs: FlightLogs) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and the last row of the unbroken stretch that each row belongs to."""
+    starts = np.flatnonzero(logs.is_new)
+    number = np.cumsum(logs.is_new) - 1
+    return starts[number], np.append(starts[1:], len(logs.time))[number] - 1
+
+
+def _late_commands(logs: FlightLogs, late: float) -> NDArray[np.float64]:
+    """Return the commands (row, axis) that act from each row to the next if all act `late` rows later."""
+    whole = math.floor(late)
+    at, (first, last) = np.arange(len(logs.time)) - whole, _stretches(logs)
+    # Within a step the command of one row gives way to that of the next: their mean acts.
+    newer, older = (logs.command[np.clip(at - row, first, last)] for row in (0, 1))
+    return (1.0 - (late - whole)) * newer + (late - whole) * older
+
+
+def _delayed(logs: FlightLogs, late: float) -> FlightLogs:
+    """Return logs whose commands act `late` rows later, without the rows whose command came before their stretch."""
+    known = np.arange(len(logs.time)) - _stretches(logs)[0] >= math.ceil(late)
+    return replace(logs, command=_late_commands(logs, late)).select_rows(known)
+
+
+def _fit_delay(logs: FlightLogs, dt: float, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], Any, int]:
+    """Return the log parameters with a fifth, the delay, their standard errors, and degrees of freedom.
+
+    z : parameters without a delay, from which the others are sought
+    """
+    loss, _ = _body_loss(logs, dt)
+    best, tried = (math.inf, z, 0.0), z
+    for late in (row for row in LATE_ROWS if row <= max(LATEST / logs.step, 0.5)):
+        near = minimize(lambda y, at=late / ROWS: loss([*y, at]), tried, method="Nelder-Mead", options={"maxiter": 80})
+        tried = near.x
+        best = min(best, (float(near.fun), tried, late), key=lambda one: one[0])
+    loss, blocks = _body_loss(logs, dt, lead=math.ceil(best[2]) + 2)
+    start = np.append(best[1], best[2] / ROWS)
+    return (y := _refined(loss, start)), *_body_errors(loss, y, blocks)
 
 
 # Mean error of tau 0.81 -> 0.18 %, of the limit -1.46 -> -0.91 %; the filter itself still runs
@@ -235,15 +283,13 @@ def _lowest(loss: Callable[[Any], float], gap: NDArray[np.float64]) -> NDArray[n
     Where no row is at the limit, the limit has no slope: a descent that went there with too long a tau stays. So other
     limits are looked at, with shorter lags beside them.
     """
-    options = {"maxiter": 600, "xatol": 2e-4, "fatol": 2e-2}
     first = [_descent(loss, np.log(s)) for s in STARTS]
     best = min(first, key=lambda found: float(found.fun))
     tau, _, noise, white = np.exp(best.x)
     limits = np.quantile(gap, LIMITED) / tau
     others = [np.log((k * tau, max(limit, 1e-3) / k, noise, white)) for limit in limits for k in SHORTER]
     best = min(best, _descent(loss, min(others, key=loss)), key=lambda found: float(found.fun))
-    again = minimize(loss, best.x, method="Nelder-Mead", options=options)
-    return np.asarray(again.x, float)
+    return _refined(loss, best.x)
 
 
 def _least_limit(loss: Callable[[Any], float], z: NDArray[np.float64], lowest: float, top: float) -> float:
@@ -268,6 +314,11 @@ def _least_limit(loss: Callable[[Any], float], z: NDArray[np.float64], lowest: f
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if fitted(middle) < lowest + WITHIN else (middle, high)
     return high
+
+
+def _refined(loss: Callable[[Any], float], start: Any) -> NDArray[np.float64]:
+    options = {"maxiter": 600, "xatol": 2e-4, "fatol": 2e-2}
+    return np.asarray(minimize(loss, start, method="Nelder-Mead", options=options).x, float)
 
 
 def _descent(loss: Callable[[Any], float], start: Any) -> Any:
@@ -300,7 +351,8 @@ def _body_errors(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArra
     inverse = np.linalg.pinv(curve)
     robust = inverse @ (slopes @ slopes.T) @ inverse * blocks / max(blocks - 1, 1)
     sampled = np.maximum(np.diag(robust), np.clip(np.diag(inverse), 0.0, None))
-    return np.minimum(np.sqrt(sampled + BEYOND**2), 3.0), blocks - 1
+    sampled[:4] += BEYOND**2
+    return np.minimum(np.sqrt(sampled), 3.0), blocks - 1
 
 
 def _judge(found: BodyFit, logs: FlightLogs) -> None:
@@ -309,6 +361,9 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
     alone = np.isnan(found.second_tau)  # the second estimator says nothing
     relative = np.inf if alone else abs(np.log(max(found.second_tau, 1e-9) / tau))
     width = np.log(found.intervals["tau"][1] / found.intervals["tau"][0]) / 3.92
+    low, high = found.intervals["delay"]
+    if high - low > 0.5 * tau or (low == 0.0 and high >= NO_DELAY * step):
+        found.refused["delay"] = f"{low:.2g} to {high:.2g} s: the commands change too little; fly velocity steps"
     if tau < 2.0 * step:
         found.refused["tau"] = (
             f"below about two steps of the log ({2.0 * step:.3g} s): log faster, or fly velocity steps"
@@ -319,10 +374,13 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
             f"two estimators disagree ({tau:.2g} s and {other}): set-points that the vehicle runs ahead of, "
             "or smoothed velocities; fly velocity steps, log the raw estimate"
         )
+    elif relative > DIFFER:
+        low, high = found.intervals["tau"]
+        found.intervals["tau"] = min(low, found.second_tau), max(high, found.second_tau)
     elif width > 0.5:
         found.refused["tau"] = "the flight hardly excites it: fly velocity steps"
     if "tau" in found.refused:
-        for name in ("a_max", "noise"):
+        for name in ("delay", "a_max", "noise"):
             found.refused[name] = "depends on tau, which is not identifiable here"
         return
     if found.gain < GAIN or found.saturated_rows < SATURATED:
@@ -332,21 +390,13 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
         )
     if not found.value["noise"] > 0.0:
         found.refused["noise"] = "no larger than the walk of the sensor's own error"
-    if found.command_delay > 0.5 * tau:
-        found.notes.append(
-            f"commands act {found.command_delay:.2g} s late, more than half of tau: this body does not fit"
-        )
-    elif found.command_delay > 1.5 * step:
-        found.notes.append(
-            f"commands act about {found.command_delay:.2g} s late; no parameter of a body describes that"
-        )
     if found.gust_correlation > 0.2:
         found.notes.append(
             f"unexplained accelerations of the drones correlate ({found.gust_correlation:.2f}): gusts that all feel"
         )
 
 
-# Checks of a fitted body: the lag by another way, late commands, and gusts that all drones feel.
+# Checks of a fitted body: the lag by another way, and gusts that all drones feel.
 MIN_ROWS = 200  # fewest rows for an estimate
 
 
@@ -397,27 +447,6 @@ def gust_correlation(logs: FlightLogs, value: dict[str, float]) -> float:
         return 0.0
     correlation = np.corrcoef(table[:, shared])
     return float((correlation.sum() - logs.drones) / (logs.drones * (logs.drones - 1)))
-
-
-def command_delay(logs: FlightLogs, value: dict[str, float]) -> float:
-    """Return the delay of commands that explains the increments best, s, to a row; for a note, since a body has no
-    delay.
-    """
-    best, kept = np.inf, 0.0
-    run = np.cumsum(logs.is_new)
-    # Whole rows only: the log knows no command between its rows. A longer delay must win by 2 %, or
-    # noise would choose it.
-    for late in range(0, 11):
-        k = np.arange(late, len(logs.time) - 1)
-        k = k[run[k - late] == run[k + 1]]
-        gap = logs.command[k - late] - logs.velocity[k]
-        size = np.maximum(np.linalg.norm(gap, axis=1), 1e-12)
-        pull = np.minimum(size / value["tau"], value["a_max"])
-        h = (logs.time[k + 1] - logs.time[k])[:, None]
-        off = float(((logs.velocity[k + 1] - logs.velocity[k] - gap * (pull / size)[:, None] * h) ** 2).mean())
-        if off < 0.98 * best:
-            best, kept = off, late * logs.step
-    return kept
 
 
 # The sensor: errors of satellite navigation of drones that stand. `parts.sensors.langevin.error` in

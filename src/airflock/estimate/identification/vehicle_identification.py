@@ -26,13 +26,13 @@ from airflock.support import AirflockError, RecordingError, expand_path, is_file
 
 # key → whether a larger number makes a flight harder
 HARDER = {
-    "body.tau": True, "body.a_max": False, "body.noise": True, "sensors.period": True, "sensors.noise": True,
-    "sensors.damping": False, "sensors.scale": True, "radio.delay": True, "radio.near": False, "radio.far": False,
+    "body.tau": True, "body.delay": True, "body.a_max": False, "body.noise": True, "sensors.period": True,
+    "sensors.noise": True, "sensors.damping": False, "sensors.scale": True, "radio.delay": True, "radio.near": False, "radio.far": False,
     "radio.received_near": False, "radio.received_far": False, "model.v_max": True,
 }  # fmt: skip
 KEY_UNITS = {
-    "body.tau": "s", "body.a_max": "m/s^2", "body.noise": "m^2/s^3", "sensors.period": "s", "sensors.noise": "m^2/s^2",
-    "sensors.damping": "1/s", "sensors.scale": "m s^(1/2)", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
+    "body.tau": "s", "body.delay": "s", "body.a_max": "m/s^2", "body.noise": "m^2/s^3", "sensors.period": "s",
+    "sensors.noise": "m^2/s^2", "sensors.damping": "1/s", "sensors.scale": "m s^(1/2)", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
     "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
 }  # fmt: skip
 HARDER |= dict.fromkeys(radio_links.TABLE_KEYS, False)
@@ -238,7 +238,7 @@ def identify(
     }
     moving = body_and_sensor.fit_body(logs, scenario.flight.dt, sensor_numbers["noise"] * sensor_numbers["damping"])
     rows = f"{moving.rows} rows, {moving.saturated_rows} limited"
-    for name in ("tau", "a_max", "noise"):
+    for name in ("delay", "tau", "a_max", "noise"):
         numbers.add(f"body.{name}", moving.value[name], moving.intervals[name], rows, moving.refused.get(name, ""))
     notes += moving.notes
     period, interval, reason = vehicle_logs.decision_period(logs)
@@ -373,7 +373,7 @@ def flight_card(like: Scenario) -> list[Flight]:
             f"one drone at a time, or all at 50 m: command {step / 2:.1f} m/s east, then {step / 2:.1f} m/s west, "
             f"{hold:.1f} s each, {repeats} times; then north and south. Velocity set-points only, no feed-forward; "
             f"log commands and raw estimates at {max(10.0, 10.0 / tau):.0f} Hz or more",
-            ("body.tau", "body.a_max", "body.noise"),
+            ("body.delay", "body.tau", "body.a_max", "body.noise"),
         ),
         Flight(
             "pairs", max(60.0, 2.0 * 2.0 * far / cruise),
