@@ -727,3 +727,52 @@ def test_rows_that_a_px4_estimator_calls_invalid_are_told():
     notes = json.loads(airflock.load_tracks(table).attrs["airflock_import"])["notes"]
     line = "DataFrame: column xy_valid: 10 rows that the estimator calls invalid left out, first row 100"
     assert any(note.startswith(line) for note in notes)
+
+
+def on_own_clocks(seed, count=4, utc="utc_us", written=1e-6, late=0.0):
+    """Drones in line, 10 m apart at 5 m/s, in one table; each counts its time since it was switched on."""
+    random, step, parts = np.random.default_rng(seed), 0.2, []
+    for k, early in enumerate(random.uniform(3.0, 200.0, count)):
+        t = step * np.arange(150)
+        held = np.floor((1_764_000_000.0 + t + random.uniform(0.0, late, 150)) / written) * written
+        place = {"x": 5.0 * t, "y": 10.0 * k, "z": 20.0}
+        clock = np.round(held / written).astype(np.int64) if utc.endswith("_us") else held
+        parts.append(pd.DataFrame({"id": k, "t": early * (1.0 + 1e-5 * k) + t, **place, utc: clock}))
+    return pd.concat(parts, ignore_index=True)
+
+
+@pytest.mark.parametrize(("column", "map"), [("utc_us", {}), ("odd_us", {"utc": "odd_us*1e-6"}), ("unix_time", {})])
+def test_individuals_of_one_table_whose_clocks_differ_meet_by_its_column_of_utc(seed, column, map):
+    notes = []
+    found = airflock.load_tracks(on_own_clocks(seed, utc=column, late=0.02), map=map, say=notes.append, unit="m")
+    scores = airflock.score(found).iloc[0]
+    assert found.time.values[-1] == pytest.approx(29.8, abs=0.3)
+    assert scores["phi_vel"] == pytest.approx(5.0, abs=0.05) and scores["r_min"] == pytest.approx(10.0, abs=0.05)
+    assert any("each individual has a clock of its own" in note and "column t" in note for note in notes)
+
+
+def test_one_clock_beside_utc_to_the_second_stays_one_clock(seed):
+    table = flock(3)
+    random = np.random.default_rng(seed)
+    table["utc"] = np.floor(1_764_000_000.0 + table["t"] + random.uniform(0.0, 0.02, len(table)))
+    with_utc, without = airflock.load_tracks(table), airflock.load_tracks(table.drop(columns="utc"))
+    np.testing.assert_array_equal(values(with_utc), values(without))
+
+
+def test_clocks_of_some_individuals_alone_are_a_question_and_readings_before_a_fix_are_one(seed):
+    table = on_own_clocks(seed).astype({"utc_us": float})
+    table.loc[table["id"] == 1, "utc_us"] = np.nan
+    assert "1: nothing says that the clocks of 4 individuals agree" in refused(table, unit="m")
+    table = on_own_clocks(seed)
+    table.loc[table.index % 150 < 5, "utc_us"] = 0
+    assert "leave out the rows without a fix" in refused(table, unit="m")
+
+
+def test_what_nobody_was_there_together_for_is_missing_and_not_zero(seed):
+    table = on_own_clocks(seed).drop(columns="utc_us")
+    table["t"] += 1000.0 * table["id"]
+    notes = []
+    found = airflock.load_tracks(table, unit="m", say=notes.append, accept=["absent"])
+    scores = airflock.score(found, body_length=1.0).iloc[0].drop("present")
+    assert scores.isna().all() and len(scores) > 5
+    assert any("no two individuals are there at a time" in note and "--map utc:=COLUMN" in note for note in notes)

@@ -260,6 +260,8 @@ def measure_recording(
     if frames.shape[2] == 1:  # no pair, no distance
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
+    if not course.notna().any(axis=None):  # a mean over no instants is no 0
+        scores = dict.fromkeys(scores, np.nan)
     scores |= {} if present.all() else {"present": float(present.mean())}
     bridged = (recording["confidence"] == 0.5) if "confidence" in recording else np.zeros(())
     scores |= {"present_measured": float(present.mean() - bridged.mean())} if bridged.any() else {}

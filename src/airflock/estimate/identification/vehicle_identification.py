@@ -27,13 +27,14 @@ from airflock.support import AirflockError, RecordingError, expand_path, is_file
 # key → whether a larger number makes a flight harder
 HARDER = {
     "body.tau": True, "body.delay": True, "body.a_max": False, "body.noise": True, "sensors.period": True,
-    "sensors.noise": True, "sensors.damping": False, "sensors.scale": True, "radio.delay": True, "radio.near": False, "radio.far": False,
-    "radio.received_near": False, "radio.received_far": False, "model.v_max": True,
+    "sensors.noise": True, "sensors.damping": False, "sensors.scale": True, "radio.delay": True,
+    "radio.near": False, "radio.far": False, "radio.received_near": False, "radio.received_far": False,
+    "model.v_max": True,
 }  # fmt: skip
 KEY_UNITS = {
     "body.tau": "s", "body.delay": "s", "body.a_max": "m/s^2", "body.noise": "m^2/s^3", "sensors.period": "s",
-    "sensors.noise": "m^2/s^2", "sensors.damping": "1/s", "sensors.scale": "m s^(1/2)", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
-    "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
+    "sensors.noise": "m^2/s^2", "sensors.damping": "1/s", "sensors.scale": "m s^(1/2)", "radio.delay": "s",
+    "radio.near": "m", "radio.far": "m", "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
 }  # fmt: skip
 HARDER |= dict.fromkeys(radio_links.TABLE_KEYS, False)
 KEY_UNITS |= dict.fromkeys(radio_links.TABLE_KEYS, "1")

@@ -1,5 +1,6 @@
 """Put tracks into one local frame (east, north, up) and on one clock."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,9 @@ def _move(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
     track.origin = origin
 
 
+SAME_CLOCK = 0.1  # s; a packet of a receiver is late by as much, a metre of a drone at 10 m/s
+
+
 # Clocks of several devices come to one time by GNSS time, or are refused: a second between two
 # drones is metres of distance.
 def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: ImportReport) -> bool:
@@ -172,25 +176,53 @@ def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: Import
 
     same : the user says that the clocks agree
     """
-    files = {track.source for track in tracks}
-    if len(files) < 2 and len(tracks) == 1:
+    if len(tracks) == 1 or same_clock:
         return True
+    sources = sorted({track.source for track in tracks})
+    for source in sources:
+        _part_clocks([track for track in tracks if track.source == source], findings)
     own = [track for track in tracks if track.clock in ("boot", "own")]
-    if not own or same_clock:
-        return True
     lacking = [track for track in own if track.utc is None]
-    if lacking and len({track.source for track in tracks}) > 1:
+    if lacking and (len(sources) > 1 or len(lacking) < len(own)):
         names = ", ".join(sorted({track.source for track in lacking})[:3])
         findings.add_error(
-            f"{names}{' ...' if len(lacking) > 3 else ''}: nothing says that the clocks of {len(files)} files "
-            "agree, and distances between individuals need that; write --same-clock if they do, or --map utc:=COLUMN"
+            f"{names}: {lacking[0].name}{' ...' if len(lacking) > 1 else ''}: nothing says that the clocks of "
+            f"{len(tracks)} individuals agree, and distances between them need that; write --same-clock if they do, or "
+            "--map utc:=COLUMN"
         )
         return False
     if len(lacking) == len(own):
         return True  # all of one file, whose clock is theirs
-    worst = max(to_utc(track) for track in own if track.utc is not None)
+    worst, name = max((to_utc(track), f"{track.source}: {track.name}") for track in own if track.utc is not None)
+    if worst > 1.0:
+        findings.add_error(
+            f"{name}: its clock is up to {worst:.3g} s off a straight line through GNSS times; leave out the rows "
+            "without a fix"
+        )
     findings.notes.append(f"clocks aligned by GNSS time, largest residual {1e3 * worst:.1f} ms")
     return True
+
+
+def _part_clocks(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Find individuals of one table whose times run on clocks of their own, as a column of UTC beside them shows."""
+    where = f"{tracks[0].source}: column {tracks[0].label('t')}"
+    shared = [track for track in tracks if track.clock == "shared"]
+    ahead = [np.quantile(np.diff(track.utc), (0.05, 0.95)) for track in shared if track.utc is not None]
+    # UTC may be written to the second: clocks differ where these readings do not overlap.
+    apart = max(low for low, _ in ahead) - min(high for _, high in ahead) if ahead else 0.0
+    if apart > SAME_CLOCK:
+        findings.notes.append(
+            f"{where}: each individual has a clock of its own, up to {apart:.4g} s apart by column "
+            f"{tracks[0].label('utc')}"
+        )
+        for track in shared:
+            track.clock = "own"
+    spans = sorted((float(track.time[0]), float(track.time[-1])) for track in shared if len(track.time))
+    if not ahead and len(spans) > 1 and all(one[1] < other[0] for one, other in itertools.pairwise(spans)):
+        findings.notes.append(
+            f"{where}: no two individuals are there at a time, so that nothing between them can be measured; if it "
+            "counts since each was switched on, write --map utc:=COLUMN"
+        )
 
 
 def to_utc(track: ImportedTrack) -> float:

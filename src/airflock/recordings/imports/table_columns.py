@@ -52,7 +52,8 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "lat": ("lat", "latitude", "location_lat"),
     "lon": ("lon", "lng", "long", "longitude", "location_long", "location_lon"),
     "alt": ("alt", "altitude", "height", "amsl", "height_above_msl", "height_above_ellipsoid", "relative_alt", "agl"),
-    "utc": ("utc", "utc_time", "unix", "unix_time", "gps_time"),
+    "utc": ("utc", "utc_time", "unix", "unix_time", "gps_time", "time_utc", "timestamp_utc",
+            "utc_timestamp", "unix_timestamp", "epoch"),
     "air": ("air", "in_air", "flying", "armed"),
 }  # fmt: skip
 # Words of single programs: EthoVision, TrackMate, TRex, NetLogo and the client of the Crazyflie. They count only
