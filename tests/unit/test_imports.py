@@ -776,3 +776,30 @@ def test_what_nobody_was_there_together_for_is_missing_and_not_zero(seed):
     scores = airflock.score(found, body_length=1.0).iloc[0].drop("present")
     assert scores.isna().all() and len(scores) > 5
     assert any("no two individuals are there at a time" in note and "--map utc:=COLUMN" in note for note in notes)
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_files_of_one_name_have_the_ids_of_the_nearest_folders_that_differ(tmp_path, ending):
+    """Every ArduPilot calls its first log 00000001.BIN, and folders of logs are called logs."""
+    files, notes = [tmp_path / f"drone {k}" / "logs" / f"00000001.{ending}" for k in (1, 2, 3)], []
+    for k, file in enumerate(files):
+        file.parent.mkdir(parents=True)
+        table = circle(k)
+        table.to_csv(file, index=False) if ending == "csv" else table.to_parquet(file)
+    for how in ({}, {"map": {"id": "file"}}):
+        found = airflock.load_tracks(files, same_clock=True, say=notes.append, **how)
+        assert list(found["individual"].values) == ["drone 1", "drone 2", "drone 3"]
+        np.testing.assert_allclose(
+            values(found)[0, :, 2], [10 * 0 + 12 * np.sin(2.0), 12 * np.cos(2.0) + 6.0], atol=1e-5
+        )
+    assert any(f"named by their folders: drone 1 ({files[0]})" in note for note in notes)
+
+
+def test_folders_that_do_not_part_files_of_one_name_are_a_question(tmp_path):
+    files = [tmp_path / drone / f"{flight}.csv" for drone in ("a", "b") for flight in (1, 2)]
+    for k, file in enumerate(files):
+        file.parent.mkdir(exist_ok=True)
+        circle(k).to_csv(file, index=False)
+    assert "1 is also in" in refused(files, same_clock=True) and "give each a folder" in refused(files, same_clock=True)
+    circle(5).to_csv(tmp_path / "a.csv", index=False)  # whose name is that of a folder
+    assert "give each a folder" in refused([files[0], files[2], tmp_path / "a.csv"], same_clock=True)

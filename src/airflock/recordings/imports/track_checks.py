@@ -1,6 +1,8 @@
 """Check tracks: missing rows, presence, names, times, heights, axes against velocities, and jumps."""
 
+from collections import Counter
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -308,14 +310,33 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
 
 
 def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Refuse two individuals with one name."""
+    """Refuse two individuals with one name, unless the folders of their files name them."""
+    _name_by_folder(tracks, findings)
     known: dict[str, ImportedTrack] = {}
     for track in tracks:
         if track.name in known:
-            findings.add_error(
-                f"{track.source}: {track.name} is also in {known[track.name].source}; write --map id:=file, or rename"
-            )
+            way = "rename one, or give each a folder" if _is_of_file(track) else "write --map id:=file, or rename"
+            findings.add_error(f"{track.source}: {track.name} is also in {known[track.name].source}; {way}")
         known.setdefault(track.name, track)
+
+
+def _is_of_file(track: ImportedTrack) -> bool:
+    return track.name == Path(track.source).stem
+
+
+def _name_by_folder(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Name individuals by the nearest folders that differ, where their files have one name, as logs of ArduPilot do."""
+    count = Counter(track.name for track in tracks)
+    same = [track for track in tracks if count[track.name] > 1 and _is_of_file(track)]
+    taken = {track.name for track in tracks} - {track.name for track in same}
+    for folders in zip(*(reversed(Path(track.source).absolute().parts[:-1]) for track in same), strict=False):
+        if len({*folders} - taken) == len(same):
+            for track, folder in zip(same, folders, strict=True):
+                track.name = folder
+            named = ", ".join(f"{track.name} ({track.source})" for track in same[:3])
+            more = f" and {len(same) - 3} more" if len(same) > 3 else ""
+            findings.notes.append(f"files of one name: individuals are named by their folders: {named}{more}")
+            return
 
 
 def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
