@@ -7,7 +7,14 @@ import pytest
 import airflock
 from airflock.parts.metrics.metric_sets import SETS
 from airflock.recordings.flown_scenario import scenario_of_recording
-from airflock.recordings.scores import IN_BODIES, body_length_settings, measure_recording, undefined_metrics_of
+from airflock.recordings.scores import (
+    IN_BODIES,
+    NEEDS,
+    body_length_settings,
+    measure_recording,
+    nearness_note,
+    undefined_metrics_of,
+)
 from airflock.support.errors import RecordingError
 from processes import called
 
@@ -63,6 +70,19 @@ def test_a_body_is_a_length(seed):
     assert body_length_settings(2.0)["metrics.r_coll"] == 1.0 and IN_BODIES["r_coll"] == 0.5
     own = airflock.score(recording, settings={"metrics.r_cluster": 4.0}, body_length=2.0)  # who knows better is heard
     assert own["n_min"][0] == airflock.score(recording, settings={"metrics.r_cluster": 4.0})["n_min"][0]
+
+
+@pytest.mark.parametrize("length", [0.5, 2.0])
+def test_line_on_what_is_near_has_the_radius_of_each_order_parameter_that_depends_on_one(seed, length):
+    recording, settings = tracks(seed), body_length_settings(length) | {"metrics.r_comm": 7.0}
+    values = measure_recording(recording, settings)[0]
+    note = nearness_note(recording, scenario_of_recording(recording, settings), values)
+    for name in values:
+        for key in set(NEEDS.get(name, ())) & IN_BODIES.keys():
+            part = note.split(f"metrics.{key} = {settings[f'metrics.{key}']:g} m (")[1].split(")")[0]
+            assert name in part.split(", ")
+    assert "metrics.r_cluster" in note and "metrics.r_comm = 7 m" in note
+    assert nearness_note(recording, scenario_of_recording(recording), measure_recording(recording)[0]) == ""
 
 
 def test_a_simulated_flight_brings_its_lengths():

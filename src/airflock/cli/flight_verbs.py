@@ -203,7 +203,7 @@ class MeasuredRecording(NamedTuple):
 
     values, course : order parameters, and a table of them over time; about : unit and meaning of each by name
     faults   : of its agents; not_told : order parameters for want of a length, with the keys that they need
-    coarse   : what to know of order parameters that a flight looks at between its frames, if anything
+    notes    : what decides who is near, and what a flight looks at between its frames; empty where nothing does
     """
 
     path: Path
@@ -212,7 +212,7 @@ class MeasuredRecording(NamedTuple):
     about: Mapping[str, tuple[str, str]]
     faults: Any
     unmeasured: Any
-    frame_note: str
+    notes: list[str]
 
 
 def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: bool) -> MeasuredRecording:
@@ -223,6 +223,7 @@ def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: 
         between_frames_note,
         load_recording,
         measure_recording,
+        nearness_note,
         power_settings,
         recorded_faults,
         scenario_of_recording,
@@ -233,9 +234,10 @@ def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: 
     settings = power_settings(recording, changed) if aero else changed
     values, course = measure_recording(recording, settings, trust=trust)
     scenario = scenario_of_recording(recording, settings, trust=trust)
-    untold, coarse = undefined_metrics_of(recording, scenario, settings), between_frames_note(recording, scenario)
+    untold = undefined_metrics_of(recording, scenario, settings)
+    notes = [nearness_note(recording, scenario, values), between_frames_note(recording, scenario)]
     about = reported_values(scenario.metrics.rule) | PRESENCE_METRICS
-    return MeasuredRecording(path, values, course, about, recorded_faults(recording), untold, coarse)
+    return MeasuredRecording(path, values, course, about, recorded_faults(recording), untold, notes)
 
 
 def _save_series(measured: Sequence[MeasuredRecording], path: Path) -> None:
@@ -279,8 +281,8 @@ def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> Non
     for each in measured:
         if each.unmeasured:
             terminal.print_message(f"{each.path}: {told_unsaid(each.unmeasured)}")
-        if each.frame_note:
-            terminal.print_message(f"{each.path}: {each.frame_note}")
+        for note in filter(None, each.notes):
+            terminal.print_message(f"{each.path}: {note}")
 
 
 # ---- sweep

@@ -58,6 +58,7 @@ from .scores import (
     group_scores as group_scores,
     measure_recording as measure_recording,
     missing_lengths_note as missing_lengths_note,
+    nearness_note as nearness_note,
     over_time as over_time,
     time_series_names as time_series_names,
     undefined_metrics_of as undefined_metrics_of,

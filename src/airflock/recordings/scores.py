@@ -417,6 +417,19 @@ def missing_lengths_note(undefined: Mapping[str, tuple[str, ...]]) -> str:
     return f"not shown, as tracks do not say what is near, fast or the centre: {', '.join(undefined)}; give {lengths}"
 
 
+def nearness_note(recording: xr.Dataset, scenario: Scenario, names: Iterable[str]) -> str:
+    """Return one line with the radii that decide what is near in these order parameters; empty for a flight."""
+    users: dict[str, list[str]] = {}
+    for name in names if scenario_document(recording) is None else ():
+        for key in NEEDS.get(name, ()):
+            users.setdefault(key, []).append(name)
+    q = scenario.resolved_metrics()
+    radii = [
+        f"metrics.{key} = {getattr(q, key):g} m ({', '.join(own)})" for key, own in users.items() if key in IN_BODIES
+    ]
+    return f"near is within {', '.join(radii)}" if radii else ""
+
+
 # A subclass and no wrapper: everything that takes a DataFrame takes it.
 class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types here
     """Table of order parameters, a column each; `attrs["units"]` and `attrs["meanings"]` describe them.
