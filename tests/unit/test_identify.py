@@ -402,6 +402,20 @@ def test_the_period_of_decisions_comes_back():
     assert not reason and period == pytest.approx(0.2, rel=1e-3) and low <= 0.2 + 1e-9 and high >= 0.2 - 1e-9
     every_row, _ = fly(0.6, 4.0, 0.05, 0.1, hold=STEP, seconds=60.0)
     assert "no faster than decisions" in periods.decision_period(every_row)[2]
+    limited = logs.command.copy()  # by a node that limits accelerations at each tick: 2 of 10 rows have nothing new
+    for k in range(1, len(limited)):
+        limited[k] = limited[k - 1] if k % 5 == 0 else limited[k - 1] + np.clip(limited[k] - limited[k - 1], -0.1, 0.1)
+    assert "no faster than decisions" in periods.decision_period(replace(logs, command=limited))[2]
+
+
+def test_largest_speed_of_a_law_in_the_plane_is_without_the_climb_that_keeps_its_height():
+    logs, _ = fly(0.6, 4.0, 0.05, 0.1, seconds=60.0)
+    angle = 0.3 * logs.time
+    climb = np.where(logs.time < 20.0, 2.0, 0.0)
+    command = np.stack([6.0 * np.cos(angle), 6.0 * np.sin(angle), climb], axis=1)
+    whole = replace(logs, command=command, velocity=np.zeros_like(command))
+    assert periods.largest_command(whole, axes=2) == (pytest.approx(6.0), "")
+    assert periods.largest_command(whole)[0] == pytest.approx(np.hypot(6.0, 2.0))
 
 
 @pytest.fixture(scope="module")

@@ -249,7 +249,8 @@ def identify(
         notes += [
             f"{note}; {numbers.reference_value('radio.range'):g} m in --like, which is kept" for note in links.notes
         ]
-    most, reason = vehicle_logs.largest_command(logs, numbers.reference_value("model.v_flock"))
+    v_flock = numbers.reference_value("model.v_flock")
+    most, reason = vehicle_logs.largest_command(logs, v_flock, scenario.dimensions)
     if hasattr(scenario.parameters, "v_max"):
         numbers.add("model.v_max", most, (0.995 * most, most), "largest command", reason)
     numbers.refuse_out_of_range()

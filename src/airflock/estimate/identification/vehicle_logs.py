@@ -140,7 +140,8 @@ def decision_period(logs: FlightLogs) -> tuple[float, tuple[float, float], str]:
     between = np.diff(flying.time[at])[np.diff(run[at]) == 0]
     if len(between) < FEW:
         return nan, (nan, nan), f"commands change {len(at)} times: fewer than {FEW}"
-    if share > 0.9:
+    # A limiter of accelerations changes commands at the rate of the log, whenever the law decides.
+    if share > 0.9 or float(np.median(between)) < 1.5 * flying.step:
         return (
             nan,
             (nan, nan),
@@ -156,12 +157,13 @@ def decision_period(logs: FlightLogs) -> tuple[float, tuple[float, float], str]:
     return period, (period - 1.96 * error, period + 1.96 * error), ""
 
 
-def largest_command(logs: FlightLogs, v_flock: float | None = None) -> tuple[float, str]:
+def largest_command(logs: FlightLogs, v_flock: float | None = None, axes: int = 3) -> tuple[float, str]:
     """Give model.v_max as a plateau of commanded speeds, m/s, and a reason to refuse it.
 
     v_flock : preferred speed of the law, m/s, at which commands have a plateau as well
+    axes    : those that the law commands; of a law in the plane something else keeps the height
     """
-    speed = np.linalg.norm(logs.flying().command, axis=1)
+    speed = np.linalg.norm(logs.flying().command[:, :axes], axis=1)
     if not len(speed):
         return float("nan"), "no commands"
     most = float(speed.max())
