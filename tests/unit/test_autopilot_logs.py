@@ -143,8 +143,7 @@ def test_rows_of_telemetry_have_the_time_of_their_states_however_late_they_came(
         place, sure = values(found, who=who), found.confidence.values[:, 0, who] > 0
         a = fast * time + system
         off = np.linalg.norm(place - np.stack([10 * np.cos(a), 10 * np.sin(a), 20 + 0 * a], axis=1), axis=1)
-        # the mean delay of the link, 0.05 s, is in the clock; without it nothing scatters
-        assert sure.mean() > 0.98 and np.abs(off[sure] - 0.05 * 7.0).max() < 0.1
+        assert sure.mean() > 0.98 and off[sure].max() < 0.1
         command = values(found, "command", who)[:, 2]
         assert (command[time < 59.5][1:][sure[time < 59.5][1:]] == 0.5).mean() > 0.95
         assert np.isnan(command[time > 60.5]).all()
