@@ -431,8 +431,7 @@ def reckoned_times(seen: NDArray[np.float64], states: NDArray[np.float64]) -> ND
     # More than a tick and a half is no matter of clocks, but a jump, which the checks must see.
     most = 1.5 * float(np.median(passed)) if len(passed) else 0.0
     ahead, found = 0.0, seen.copy()
-    for k, (step, between) in enumerate(zip(took, passed, strict=True), 1):
-        ahead = (1.0 - CLOCK_GAIN) * (ahead + step - between)
-        ahead = ahead if abs(ahead) <= most else 0.0
+    for k, gained in enumerate(np.where(np.abs(took - passed) <= most, took - passed, 0.0), 1):
+        ahead = (1.0 - CLOCK_GAIN) * (ahead + gained)
         found[k] += ahead
     return found
