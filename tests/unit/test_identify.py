@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -149,6 +150,40 @@ def test_commands_that_act_at_once_have_no_delay_and_leave_the_lag_as_it_was(siz
     found = body.fit_body(logs, dt)
     assert found.value["delay"] == 0.0 and 0.0 <= found.intervals["delay"][1] < 2.0 * STEP
     assert found.value["tau"] == pytest.approx(0.8, rel=0.1)
+
+
+def test_measured_response_of_arducopter_is_that_of_its_limits_of_acceleration_and_jerk():
+    """40 s of a flock in GUIDED mode at the defaults, WPNAV_ACCEL 2.5 m/s^2 and PSC_JERK_XY 5 m/s^3.
+
+    Its controller turns the gap into an acceleration by jerk / accel, 2 1/s, so that a lag of 0.5 s is no surprise; the
+    same velocities as one lag without limits would be a second late, and more than twice as far off.
+    """
+    table = pd.read_csv(Path(__file__).parents[1] / "arducopter_guided.csv", comment="#").to_numpy() * 1e-3
+    time, seen, wish = table[:, 0], table[:, 1:3], table[:, 3:5]
+    new = np.arange(len(time)) == 0
+    logs = FlightLogs(time, 0.0 * seen, seen, wish, np.zeros(len(time), int), new, ["d"], np.zeros(len(time), bool))
+    found = body.fit_body(logs)
+    assert 0.05 < found.value["delay"] < 0.25 and 0.4 < found.value["tau"] < 0.55
+    assert "at least 2.3" in found.refused["a_max"] and 2.0 < found.value["a_max"] < 2.6
+
+    def flown(delay, tau, a_max, jerk, dt=0.01):
+        speed, pull, off = seen[0].copy(), np.zeros(2), []
+        for k in range(1, len(time)):
+            for t in np.arange(time[k - 1], time[k] - 1e-9, dt):
+                gap = (wish[max(np.searchsorted(time, t - delay, side="right") - 1, 0)] - speed) / tau
+                gap *= min(1.0, a_max / max(np.linalg.norm(gap), 1e-9))
+                change = gap - pull
+                pull = pull + change * min(1.0, jerk * dt / max(np.linalg.norm(change), 1e-9))
+                speed = speed + pull * dt
+            off.append(speed - seen[k])
+        return float(np.sqrt((np.array(off) ** 2).sum(axis=1).mean()))
+
+    free = 1e9
+    limited, lag = (
+        flown(0.1, 0.5, 2.5, 5.0),
+        min(flown(d, tau, free, free) for d in (0.2, 0.4) for tau in (0.8, 1.0, 1.2)),
+    )
+    assert limited < 0.15 and lag > 2.0 * limited
 
 
 @pytest.mark.parametrize("seed", range(4))
