@@ -144,6 +144,19 @@ def test_delay_and_lag_of_a_body_come_back_apart(tau, delay, a_max):
     assert not {"delay", "tau"} & set(found.refused)
 
 
+def test_delay_of_a_log_with_many_gaps_comes_back_or_is_refused():
+    """Stretches of 1.5 s know the command of 0.4 s ago; shorter ones do not, and nothing is made up."""
+    logs, dt = fly(0.6, 4.0, 0.05, 0.05)
+    shifted = late(logs, 8)
+    for rows in (30, 12, 9, 6):
+        gap = np.arange(len(logs.time)) % (rows + 3) < 3
+        found = body.fit_body(shifted.select_rows(~gap), dt)
+        if rows == 30:
+            assert found.value["delay"] == pytest.approx(0.4, abs=0.03) and "delay" not in found.refused
+        else:
+            assert "log every row" in found.refused["delay"] and "tau" in found.refused
+
+
 @pytest.mark.parametrize("size", [3.0, 8.0])
 def test_commands_that_act_at_once_have_no_delay_and_leave_the_lag_as_it_was(size):
     logs, dt = fly(0.8, 4.0, 0.1, 0.1, size=size)

@@ -151,7 +151,8 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
     later, later_spread, freedom = _fit_delay(flying, dt, z)
     late, error = ROWS * later[4], 1.96 * ROWS * later_spread[4]
     low_delay, high_delay = flying.step * max(late - error, 0.0), flying.step * max(late + error, 0.5)
-    # Less than none is sought, too, or an interval that begins at none would look sharp.
+    if late > _longest_delay(flying) - 0.5:  # it may be any longer one
+        high_delay = math.inf
     # No delay is the rule in simulation: then the fit is one without it, and as sharp as that.
     late = 0.0 if late - error < 0.5 and late + error < NO_DELAY else max(late, 0.0)
     if late:
@@ -204,13 +205,14 @@ def _body_loss(logs: FlightLogs, dt: float, lead: int = 0) -> tuple[Callable[...
     out = np.zeros(int(span.max()) + 1)
     rows, velocity = np.arange(len(logs.time)), np.ascontiguousarray(logs.velocity)
     counted = _counted_rows(logs) & (rows - _stretches(logs)[0] >= lead)
-    kernel = _body_kernel()
+    kernel, longest = _body_kernel(), _longest_delay(logs)
 
     def loss(z: Any, blocks: Any = None) -> float:
         tau, a_max, noise, white = np.exp(z[:4])
         late = ROWS * z[4] if len(z) > 4 else 0.0
-        if not dt < 0.9 * tau or max(z[:4]) > 12.0 or min(z[:4]) < -14.0 or abs(late) > LATEST / logs.step:
+        if not dt < 0.9 * tau or max(z[:4]) > 12.0 or min(z[:4]) < -14.0 or abs(late) > longest:
             return 1e15
+        # Delays below 0 are looked at, too, or an interval that begins at 0 would look sharp.
         acting = logs.command if late == 0.0 else _late_commands(logs, late)
         arrays = (logs.time, velocity, np.ascontiguousarray(acting), logs.is_new, counted, span)
         return float(kernel(*arrays, out if blocks is None else blocks, tau, a_max, noise, white, dt))
@@ -223,6 +225,11 @@ def _stretches(logs: FlightLogs) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     starts = np.flatnonzero(logs.is_new)
     number = np.cumsum(logs.is_new) - 1
     return starts[number], np.append(starts[1:], len(logs.time))[number] - 1
+
+
+def _longest_delay(logs: FlightLogs) -> float:
+    """Return the longest delay that is sought, rows: at least half of the rows know their command then."""
+    return min(LATEST / logs.step, float(np.median(np.arange(len(logs.time)) - _stretches(logs)[0])))
 
 
 def _late_commands(logs: FlightLogs, late: float) -> NDArray[np.float64]:
@@ -247,7 +254,7 @@ def _fit_delay(logs: FlightLogs, dt: float, z: NDArray[np.float64]) -> tuple[NDA
     """
     loss, _ = _body_loss(logs, dt)
     best, tried = (math.inf, z, 0.0), z
-    for late in (row for row in LATE_ROWS if row <= max(LATEST / logs.step, 0.5)):
+    for late in (row for row in LATE_ROWS if row <= _longest_delay(logs)):
         near = minimize(lambda y, at=late / ROWS: loss([*y, at]), tried, method="Nelder-Mead", options={"maxiter": 80})
         tried = near.x
         best = min(best, (float(near.fun), tried, late), key=lambda one: one[0])
@@ -362,9 +369,13 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
     relative = np.inf if alone else abs(np.log(max(found.second_tau, 1e-9) / tau))
     width = np.log(found.intervals["tau"][1] / found.intervals["tau"][0]) / 3.92
     low, high = found.intervals["delay"]
-    if high - low > 0.5 * tau or (low == 0.0 and high >= NO_DELAY * step):
+    if math.isinf(high):
+        found.refused["delay"] = f"at least {low:.2g} s, longer than the log goes on without a gap: log every row"
+    elif high - low > 0.5 * tau or (low == 0.0 and high >= NO_DELAY * step):
         found.refused["delay"] = f"{low:.2g} to {high:.2g} s: the commands change too little; fly velocity steps"
-    if tau < 2.0 * step:
+    if math.isinf(high):
+        found.refused["tau"] = "depends on delay, which is not identifiable here"
+    elif tau < 2.0 * step:
         found.refused["tau"] = (
             f"below about two steps of the log ({2.0 * step:.3g} s): log faster, or fly velocity steps"
         )
@@ -381,7 +392,7 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
         found.refused["tau"] = "the flight hardly excites it: fly velocity steps"
     if "tau" in found.refused:
         for name in ("delay", "a_max", "noise"):
-            found.refused[name] = "depends on tau, which is not identifiable here"
+            found.refused.setdefault(name, "depends on tau, which is not identifiable here")
         return
     if found.gain < GAIN or found.saturated_rows < SATURATED:
         found.refused["a_max"] = (
