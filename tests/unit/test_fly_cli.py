@@ -10,6 +10,10 @@ import time
 import pytest
 
 from airflock.cli.main import main
+from airflock.drones.mavlink.signing import read_key
+from airflock.drones.onboard.card import read_card
+from airflock.drones.onboard.flight_log import LoggingNode, code_version
+from airflock.drones.onboard.node import Node, NodeMemory
 
 HERE = ["--site", "47.5,19.04,120", "--members", "1-3", "--set", "world.side=120"]
 REAL = "vasarhelyi_2018/real_4ms"
@@ -246,6 +250,35 @@ def test_a_check_on_the_ground_finds_a_radio_whose_name_leads_nowhere(airflock, 
     autopilot = ["--autopilot", "udp:127.0.0.1:39431"]
     code, out, lines = airflock("fly", "mission.json", "--member", 2, *autopilot, "--radio", radio, "--check")
     assert code == 2 and not out and len(lines) == 1 and lines[0].startswith(f"airflock: {radio}: ")
+
+
+def test_log_of_another_version_is_reported_with_the_ticks_that_differ(airflock, tmp_path):
+    airflock("fly", "prepare", REAL, *HERE)
+    found, key = read_card(tmp_path / "mission.json"), read_key(tmp_path / "mission.key")
+    lines, usual = [], {"memory": NodeMemory(), "radios": (0.1,)}
+    node = LoggingNode(Node(found, 2, key, now=0.0, utc=10**15, **usual), lines.append, now=0.0, **usual)
+    for k in range(100):
+        node.tick(0.05 * k)
+    log = tmp_path / "x.log"
+    log.write_text("\n".join(lines) + "\n")
+    code, _, told = airflock("fly", "replay", "mission.json", "x.log")
+    assert code == 0 and told[-1] == "100 ticks, 0 with another output than was logged"
+    head = json.loads(lines[0])
+    assert head.pop("version") == code_version()
+    lines[0] = json.dumps(head)
+    for k, phase in ((40, "BOOT"), (41, "READY"), (95, "BOOT")):
+        lines[k] = json.dumps(json.loads(lines[k]) | {"out": "0" * 16, "phase": phase})
+    log.write_text("\n".join(lines) + "\n")
+    code, _, told = airflock("fly", "replay", "mission.json", "x.log")
+    assert code == 2 and "flown by another version (an earlier one; this is " in told[-1] and "3 of 100" in told[-1]
+    said = "\n".join(told)
+    assert "1.95 to 2.00 s  2 ticks with another output" in said and "4.70 to 4.70 s  1 ticks" in said
+    assert "2.00 s  the log says READY, this version BOOT" in said
+    _, out, _ = airflock("fly", "replay", "mission.json", "x.log", "--json")
+    assert (
+        json.loads(out)["different"] == pytest.approx([1.95, 2.0, 4.7])
+        and "earlier" in json.loads(out)["another_version"]
+    )
 
 
 def test_a_file_that_is_no_log_is_one_line(airflock, tmp_path):

@@ -544,6 +544,7 @@ def run_node(ctx: typer.Context) -> None:
 
 fly_app.command("prepare", cls=VerbCommand)(prepare)
 fly_app.command("order", cls=VerbCommand)(order)
+SPAN_GAP = 2.0  # s; ticks that differ are reported together unless so many agree between them
 
 
 @fly_app.command("replay", cls=VerbCommand)
@@ -556,22 +557,38 @@ def replay(
 
     Example: airflock fly replay mission.json mission-3-20270115T101500Z.log
     """
-    from airflock.drones import read_card, read_key, replay_log_file
+    from airflock.drones import code_version, read_card, read_key, replay_log_file
 
     card, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
-    ticks, different, notes = 0, [], []
+    ticks, notes, version, phases = 0, [], code_version(), ("", "")
+    different: list[float] = []
+    spans: list[tuple[float, float, int]] = []  # first and last time and number of ticks that differ
     for tick in replay_log_file(log, card, key):
-        ticks += 1
+        ticks, version = ticks + 1, tick.version or "an earlier one"
         notes += [(tick.time, note) for note in tick.out.notes]
+        before, phases = phases, (str(tick.entry.get("phase")), tick.phase.name)
+        if phases != before and phases[0] != phases[1]:
+            notes.append((tick.time, f"the log says {phases[0]}, this version {phases[1]}"))
         if not tick.same:
             different.append(tick.time)
+            goes_on = bool(spans) and tick.time - spans[-1][1] <= SPAN_GAP
+            begin, _, count = spans.pop() if goes_on else (tick.time, tick.time, 0)
+            spans.append((begin, tick.time, count + 1))
+    other = "" if version == code_version() else f"flown by another version ({version}; this is {code_version()})"
     if as_json:
-        terminal.print_json({"ticks": ticks, "different": different, "notes": notes})
+        terminal.print_json({"ticks": ticks, "different": different, "another_version": other or None, "notes": notes})
     else:
         for at, note in notes:
             terminal.print_message(f"{at:10.2f} s  {note}")
+        for begin, end, count in spans:
+            terminal.print_message(f"{begin:10.2f} to {end:.2f} s  {count} ticks with another output")
         terminal.print_message(f"{ticks} ticks, {len(different)} with another output than was logged")
+        if other and not different:
+            terminal.print_message(f"{log}: {other}; both decide alike here")
     if different:
         raise ScenarioError(
-            [f"{log}: {len(different)} of {ticks} ticks differ when flown again, first at {different[0]:g} s"]
+            [
+                f"{log}: {len(different)} of {ticks} ticks differ when flown again, first at {different[0]:.2f} s"
+                + (other and f"; {other}")
+            ]
         )

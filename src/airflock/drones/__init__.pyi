@@ -47,6 +47,7 @@ from .onboard.card import (
     write_card as write_card,
 )
 from .onboard.flight_log import (
+    code_version as code_version,
     read_log_ticks as read_log_ticks,
     replay_log_file as replay_log_file,
 )

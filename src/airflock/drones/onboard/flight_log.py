@@ -6,9 +6,11 @@ A log can be flown again through the same node, bit for bit: each decision can b
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from airflock import __version__
 from airflock.core import State
 from airflock.drones.mavlink.frames import FrameStream, MavlinkFrame
 from airflock.drones.onboard.card import FlightCard
@@ -31,6 +33,15 @@ LOG_VERSION = 1
 MAX_RADIOS = 16
 MAX_GAP = 3600.0  # s between two lines; a node ticks many times a second
 MAX_CLOCK = 1e12  # s; clocks count from the start of a computer
+DECIDING_ROOMS = ("core", "drones", "parts", "support", "world")  # rooms whose code decides on board
+
+
+@cache
+def code_version() -> str:
+    """Return the version of the package, and a digest of the code that decides on board."""
+    root = Path(__file__).parents[2]
+    files = sorted(file for room in DECIDING_ROOMS for file in (root / room).rglob("*.py"))
+    return f"{__version__}+{hashlib.sha256(b''.join(file.read_bytes() for file in files)).hexdigest()[:8]}"
 
 
 class LoggingNode:
@@ -44,7 +55,8 @@ class LoggingNode:
     ):
         self.node, self._write = node, write
         self._line(
-            log=LOG_VERSION, card=node.card.hash, member=node.member, now=now, utc=node.utc(now), sent=memory.sent,
+            log=LOG_VERSION, version=code_version(), card=node.card.hash, member=node.member, now=now,
+            utc=node.utc(now), sent=memory.sent,
             heard=memory.heard, order=memory.order, radios=radios, since=node.accepted_since,
         )  # fmt: skip
 
@@ -79,12 +91,17 @@ def output_digest(out: NodeOutput) -> str:
 
 
 class ReplayedTick(NamedTuple):
-    """One tick of a log flown again: time, entry of the log, output of the node, and whether they agree."""
+    """One tick of a log flown again: time, entry of the log, output and phase of the node, and whether they agree.
+
+    version : of the code that wrote the log; empty where it did not say so yet
+    """
 
     time: float
     entry: dict[str, Any]
     out: NodeOutput
     same: bool
+    phase: MissionPhase
+    version: str
 
 
 class LoggedTick(NamedTuple):
@@ -178,7 +195,8 @@ def replay(lines: Iterable[str], card: FlightCard, key: bytes) -> Iterator[Repla
             node.radio(data, now)
         else:
             out = node.tick(now)
-            yield ReplayedTick(now, row, out, output_digest(out) == row["out"])
+            same, version = output_digest(out) == row["out"], str(head.get("version", ""))
+            yield ReplayedTick(now, row, out, same, node.phase, version)
 
 
 def _node_at_start(head: Mapping[str, Any], card: FlightCard, key: bytes) -> Node:
