@@ -3,7 +3,7 @@
 import pytest
 import run
 
-QUICK = {"drivers", "options", "scenarios"}  # seconds each; .ci/nightly compares all
+QUICK = {"drivers", "mission", "options", "scenarios"}  # seconds each; .ci/nightly compares all
 
 
 @pytest.mark.parametrize("name", sorted(QUICK & set(run.names())))

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from airflock.core.contract import State
 from airflock.core.maths import braking_curve
@@ -12,6 +12,7 @@ from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.card import SafetyLimits
 from airflock.drones.onboard.mission import FLYING_PHASES, MISSION_TABLE, MissionFacts, MissionPhase, next_step
 from airflock.drones.onboard.steering import limit_velocity
+from mission_events import EVENTS, fly
 
 WELL, SAFE = MissionFacts(), SafetyLimits()
 P = MissionPhase
@@ -22,6 +23,7 @@ ROWS = [
     ("1", P.LAND, {"in_guided_mode": False, "in_land_mode": False}, P.MANUAL, None, None),
     ("2", P.MANUAL, {"resume_ordered": True, "setpoints_for": 2.0}, P.HOLD, None, None),
     ("3", P.MANUAL, {"armed": False}, P.DONE, None, None),
+    ("3b", P.MANUAL, {"armed": False, "has_flown": False}, P.READY, None, None),
     ("4", P.FLOCK, {"kill_confirmed": True}, P.DONE, PILOT, P.MANUAL),
     ("5", P.FLOCK, {"position_bad_for": 0.1}, P.HOLD, PILOT, P.MANUAL),
     ("5b", P.HOLD, {"position_bad_for": 5.1}, P.LAND, PILOT, P.MANUAL),
@@ -50,6 +52,7 @@ ROWS = [
     ("19", P.ARMING, {"setpoints_for": 2.0}, P.TAKEOFF, {"kill_confirmed": True}, P.DONE),
     ("19c", P.ARMING, {"order": OrderKind.LAND}, P.READY, {"kill_confirmed": True}, P.DONE),
     ("19c", P.ARMING, {"armed": False, "order": OrderKind.HOLD}, P.READY, None, None),
+    ("19d", P.ARMING, {"armed": False, "calm_for": 0.0}, P.READY, {"kill_confirmed": True}, P.DONE),
     ("19b", P.ARMING, {"armed": False, "phase_for": 11.0}, P.READY, {"kill_confirmed": True}, P.DONE),
     ("20", P.TAKEOFF, {"at_layer": True}, P.GATHER, {"gnss_bad_for": 1.0}, P.HOLD),
     ("21", P.TAKEOFF, {"neighbour_near": True}, P.HOLD, {"at_layer": True}, P.GATHER),
@@ -73,7 +76,12 @@ ROWS = [
         {"is_landed": False, "kill_confirmed": True},
         P.DONE,
     ),
+    ("27b", P.LAND, {"armed": False, "has_flown": False}, P.READY, {"kill_confirmed": True}, P.DONE),
     ("28", P.BOOT, {"is_landed": False}, P.MANUAL, None, None),
+    ("28b", P.DONE, {"in_guided_mode": False}, P.MANUAL, None, None),
+    ("28b", P.ARMING, {"in_guided_mode": False}, P.MANUAL, {"kill_confirmed": True}, P.DONE),
+    ("29", P.HOLD, {"is_landed": True, "landed_for": 1.1}, P.LAND, {"kill_confirmed": True}, P.DONE),
+    ("30", P.FLOCK, {"bad_streams": ("own position at 4.2 Hz",)}, P.HOLD, {"position_bad_for": 9.0}, P.LAND),
 ]
 
 
@@ -96,9 +104,9 @@ def test_every_row_fires_and_gives_way_to_a_higher_one(number, phase, given, to,
         assert order.index(above.row.number) < len(order) - order[::-1].index(number)
 
 
-def test_all_28_rows_of_the_table_are_here():
-    whole = {number.rstrip("bc") for number, *_ in ROWS}
-    assert whole == {row.number.rstrip("bc") for row in MISSION_TABLE} == {str(k) for k in range(1, 29)}
+def test_all_30_rows_of_the_table_are_here():
+    whole = {number.rstrip("bcd") for number, *_ in ROWS}
+    assert whole == {row.number.rstrip("bcd") for row in MISSION_TABLE} == {str(k) for k in range(1, 31)}
     assert {number for number, *_ in ROWS} == {row.number for row in MISSION_TABLE}
 
 
@@ -121,10 +129,57 @@ def test_whatever_goes_wrong_the_pilot_comes_first_and_nothing_on_the_ground_fli
     if phase in (P.BOOT, P.READY, P.CLEARED, P.DONE, P.FAULT):
         assert step.next_phase not in FLYING_PHASES
         assert step.next_phase != P.ARMING or (phase == P.CLEARED and odd["due"])
-    if phase in (P.DONE, P.FAULT):
+    if phase == P.FAULT or (phase == P.DONE and not (odd["armed"] and odd["is_airborne"])):
         assert step.next_phase == phase
     if phase == P.MANUAL and step.next_phase == P.HOLD:
         assert odd["in_guided_mode"] and odd["resume_ordered"] and odd["has_good_navigation"]
+        assert odd["armed"] and odd["is_airborne"] and odd["is_high"]
+    if step.next_phase in (P.GATHER, P.FLOCK, P.GOTO) and step.next_phase != phase:
+        assert not odd["is_landed"]
+    if odd["is_landed"] and odd["landed_for"] > 1.0 and phase in FLYING_PHASES - {P.TAKEOFF}:
+        assert step.next_phase in (P.LAND, P.MANUAL, P.DONE)
+
+
+# ------------------------------------------------------------------------------------------------- random events
+
+READY = ("neighbour is heard", 10)
+STARTS = [[READY, (OrderKind.START, ticks)] for ticks in (2, 20, 45, 65)]  # is arming, takes off, gathers, flocks
+BY_HAND = [("pilot arms", 1), ("pilot climbs", 5)]
+sequences = st.tuples(
+    st.sampled_from(["px4", "ardupilot"]),
+    st.sampled_from([[], [READY], BY_HAND, [READY, *BY_HAND], *STARTS, [*STARTS[-1], ("pilot takes over", 5)]]),
+    st.lists(st.tuples(st.sampled_from(EVENTS), st.sampled_from([1, 2, 5, 10, 20])), max_size=12),
+)
+
+
+@pytest.mark.parametrize(
+    "count", [300, *(pytest.param(50_000, marks=pytest.mark.nightly, id=f"nightly-{part}") for part in (1, 2))]
+)
+def test_nobody_flocks_on_the_ground_arms_unseen_or_climbs_without_an_order(count):
+    """Whatever happens in whatever order; a failure prints its sequence and all that happened."""
+
+    @settings(max_examples=count)
+    @given(sequences)
+    def holds(sequence):
+        kind, begun, events = sequence
+        fly(kind, [*begun, *events])
+
+    holds()
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+def test_take_off_that_was_held_in_the_air_goes_on_to_its_layer(kind):
+    """ArduPilot takes off by a command that it refuses in the air: setpoints lift it there. No point is flown to."""
+    flight = fly(kind, [*STARTS[1], (OrderKind.HOLD, 20)])
+    assert flight.node.phase == P.HOLD and 1.0 < flight.z < 8.0
+    flight.log.clear()
+    for event, ticks in ((OrderKind.GOTO, 5), (OrderKind.RESUME, 60)):
+        flight.apply(event)
+        for _ in range(ticks):
+            flight.step()
+    changes = [text.partition(":")[0] for _, text in flight.log if "→" in text]
+    assert changes == ["HOLD → TAKEOFF", "TAKEOFF → GATHER", "GATHER → FLOCK"], flight.log
+    assert flight.z > 9.4
 
 
 # -------------------------------------------------------------------------------------------------------- limiter

@@ -5,6 +5,7 @@ Commands in Guided Mode and Complete Parameter List. Numbers of commands and mes
 """
 
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -216,8 +217,6 @@ class AutopilotCommands:
         """Request one message once."""
         return self.command(REQUEST_MESSAGE_COMMAND, float(number))
 
-    def request_streams(self) -> list[bytes]:
-        """Request all messages that a node flies by, at their rates."""
-        return [
-            self.command(MESSAGE_INTERVAL_COMMAND, float(number), 1e6 / rate) for number, rate in STREAM_RATES.items()
-        ]
+    def request_streams(self, numbers: Iterable[int]) -> list[bytes]:
+        """Request streams of these messages, at the rates that a node needs."""
+        return [self.command(MESSAGE_INTERVAL_COMMAND, float(number), 1e6 / STREAM_RATES[number]) for number in numbers]

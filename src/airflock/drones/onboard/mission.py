@@ -61,6 +61,9 @@ class MissionFacts(NamedTuple):
     in_land_mode: bool = False  # it lands by itself
     armed: bool = True
     is_landed: bool = False
+    is_airborne: bool = True  # neither this nor is_landed: the autopilot does not report it
+    is_high: bool = True  # not below the lowest height of the fence
+    has_flown: bool = True  # in the air in a phase in which this node flies it
     has_good_navigation: bool = True
     order: OrderKind | None = None
     kill_confirmed: bool = False  # the operator confirmed a kill
@@ -68,6 +71,8 @@ class MissionFacts(NamedTuple):
     held: bool = False  # HOLD was ordered: only an order ends it
     position_bad_for: float = 0.0
     gnss_bad_for: float = 0.0
+    landed_for: float = 0.0  # in a phase in which it should fly
+    bad_streams: tuple[str, ...] = ()  # streams of the autopilot that are too slow or silent, a line each
     battery_critical: bool = False
     battery_needed_home: bool = False  # just enough is left for the way home
     outside_for: float = 0.0
@@ -91,7 +96,7 @@ class MissionFacts(NamedTuple):
     have_gathered: bool = False
     time_over: bool = False
     member_joined: bool = False
-    calm_for: float = 0.0
+    calm_for: float = 1.0  # since no reason to hold is left; 0: there is one
     at_home: bool = False
     phase_before_hold: MissionPhase = MissionPhase.FLOCK  # where HOLD came from
 
@@ -126,6 +131,7 @@ def _phases(*phases: MissionPhase) -> frozenset[MissionPhase]:
     return frozenset(phases)
 
 
+LANDED_TIME = 1.0  # s; a drone that is on the ground for longer does not fly, whatever its phase says
 _P = MissionPhase
 PHASES_BEFORE_RETURN = _phases(_P.TAKEOFF, _P.GATHER, _P.FLOCK, _P.GOTO)
 
@@ -151,11 +157,18 @@ MISSION_TABLE: tuple[Row, ...] = (
         _phases(_P.MANUAL),
         "the operator resumes, and the pilot has selected our mode",
         lambda f, s: (
-            f.resume_ordered and f.in_guided_mode and f.armed and f.has_good_navigation and f.setpoints_for >= s.stream
+            f.resume_ordered
+            and f.in_guided_mode
+            and f.armed
+            and f.is_airborne
+            and f.is_high
+            and f.has_good_navigation
+            and f.setpoints_for >= s.stream
         ),
         _P.HOLD,
     ),
-    Row("3", _phases(_P.MANUAL), "disarmed on the ground", lambda f, s: not f.armed, _P.DONE),
+    Row("3", _phases(_P.MANUAL), "disarmed on the ground", lambda f, s: not f.armed and f.has_flown, _P.DONE),
+    Row("3b", _phases(_P.MANUAL), "disarmed before its mission", lambda f, s: not f.armed, _P.READY),
     Row(
         "4",
         FLYING_PHASES | {_P.LAND, _P.ARMING},
@@ -163,10 +176,25 @@ MISSION_TABLE: tuple[Row, ...] = (
         lambda f, s: f.kill_confirmed,
         _P.DONE,
     ),
+    # Whatever led here, such as a HOLD before it took off: commands must not move what stands.
+    Row(
+        "29",
+        FLYING_PHASES - {_P.TAKEOFF},
+        "stands on the ground",
+        lambda f, s: f.landed_for > LANDED_TIME,
+        _P.LAND,
+    ),
     Row("5b", FLYING_PHASES, "no position for too long", lambda f, s: f.position_bad_for > s.stale_land, _P.LAND),
     Row("5", FLYING_PHASES - {_P.HOLD}, "no valid position", lambda f, s: f.position_bad_for > 0.0, _P.HOLD),
     Row("6b", FLYING_PHASES, "bad navigation for too long", lambda f, s: f.gnss_bad_for > s.gnss_land, _P.LAND),
     Row("6", FLYING_PHASES - {_P.HOLD}, "bad navigation", lambda f, s: f.gnss_bad_for > 0.0, _P.HOLD),
+    Row(
+        "30",
+        PHASES_BEFORE_RETURN,
+        "streams of the autopilot are too slow or silent",
+        lambda f, s: bool(f.bad_streams),
+        _P.HOLD,
+    ),
     Row("7", FLYING_PHASES, "the battery is critical", lambda f, s: f.battery_critical, _P.LAND),
     Row(
         "8",
@@ -241,6 +269,21 @@ MISSION_TABLE: tuple[Row, ...] = (
     Row(
         "28", _phases(_P.BOOT), "started in the air", lambda f, s: f.present and f.armed and not f.is_landed, _P.MANUAL
     ),
+    # A phase of the ground would hide it from the others.
+    Row(
+        "28b",
+        _phases(_P.READY, _P.CLEARED, _P.DONE),
+        "somebody else flies it",
+        lambda f, s: f.armed and f.is_airborne and not f.kill_confirmed,
+        _P.MANUAL,
+    ),
+    Row(
+        "28b",
+        _phases(_P.ARMING),
+        "somebody else flies it",
+        lambda f, s: f.armed and f.is_airborne and not f.in_guided_mode,
+        _P.MANUAL,
+    ),
     Row("16b", _phases(_P.BOOT, _P.READY, _P.CLEARED), "something can never fit", lambda f, s: bool(f.fault), _P.FAULT),
     Row(
         "16",
@@ -252,6 +295,13 @@ MISSION_TABLE: tuple[Row, ...] = (
     Row("17", _phases(_P.READY), "nothing is missing", lambda f, s: not f.missing and not f.armed, _P.CLEARED),
     Row("17b", _phases(_P.CLEARED), "something is missing", lambda f, s: bool(f.missing) or f.armed, _P.READY),
     Row("18", _phases(_P.CLEARED), "the operator's start is due", lambda f, s: f.due, _P.ARMING),
+    Row(
+        "19d",
+        _phases(_P.ARMING),
+        "a reason to hold, before it took off",
+        lambda f, s: f.calm_for == 0.0,
+        _P.READY,
+    ),
     Row("19c", _phases(_P.ARMING), "the start is called off", lambda f, s: f.order in CALL_OFF_ORDERS, _P.READY),
     Row(
         "19",
@@ -261,7 +311,7 @@ MISSION_TABLE: tuple[Row, ...] = (
         _P.TAKEOFF,
     ),
     Row("19b", _phases(_P.ARMING), "not armed in time", lambda f, s: f.phase_for > s.arm_time, _P.READY),
-    Row("20", _phases(_P.TAKEOFF), "on the own layer", lambda f, s: f.at_layer, _P.GATHER),
+    Row("20", _phases(_P.TAKEOFF), "on the own layer", lambda f, s: f.at_layer and not f.is_landed, _P.GATHER),
     Row(
         "21b",
         _phases(_P.TAKEOFF),
@@ -274,7 +324,7 @@ MISSION_TABLE: tuple[Row, ...] = (
         "22",
         _phases(_P.GATHER),
         "all are gathered, or the operator says go",
-        lambda f, s: f.have_gathered or f.order == OrderKind.GO,
+        lambda f, s: (f.have_gathered or f.order == OrderKind.GO) and f.is_high and not f.is_landed,
         _P.FLOCK,
     ),
     Row("23", FLYING_PHASES, "ordered to land", lambda f, s: f.order == OrderKind.LAND, _P.LAND),
@@ -290,14 +340,39 @@ MISSION_TABLE: tuple[Row, ...] = (
         "23",
         FLOCKING_PHASES | {_P.HOLD},
         "ordered to a point",
-        lambda f, s: f.order == OrderKind.GOTO and f.has_good_navigation,
+        lambda f, s: (
+            f.order == OrderKind.GOTO
+            and f.has_good_navigation
+            and f.is_high
+            and not f.is_landed
+            and f.phase_before_hold != _P.TAKEOFF
+        ),
         _P.GOTO,
     ),
-    Row("23", _phases(_P.GOTO), "ordered to flock on", lambda f, s: f.order == OrderKind.RESUME, _P.FLOCK),
+    Row(
+        "23",
+        _phases(_P.GOTO),
+        "ordered to flock on",
+        lambda f, s: f.order == OrderKind.RESUME and not f.is_landed,
+        _P.FLOCK,
+    ),
     Row("24", FLOCKING_PHASES, "a member joins", lambda f, s: f.member_joined, None),
-    Row("25", _phases(_P.HOLD), "all is well again", lambda f, s: f.calm_for >= s.calm and not f.held, None),
+    Row(
+        "25",
+        _phases(_P.HOLD),
+        "all is well again",
+        lambda f, s: f.calm_for >= s.calm and not f.held and not f.is_landed,
+        None,
+    ),
     Row("26", _phases(_P.RETURN), "above home", lambda f, s: f.at_home, _P.LAND),
-    Row("27", _phases(_P.LAND), "landed", lambda f, s: f.is_landed or not f.armed, _P.DONE),
+    Row("27b", _phases(_P.LAND), "it never left the ground", lambda f, s: not (f.armed or f.has_flown), _P.READY),
+    Row(
+        "27",
+        _phases(_P.LAND),
+        "landed",
+        lambda f, s: not f.armed or (f.is_landed and f.in_land_mode and f.has_flown),
+        _P.DONE,
+    ),
 )
 CALM_ROW = next(row for row in MISSION_TABLE if row.number == "25")
 ROWS_OF_PHASE = {phase: tuple(row for row in MISSION_TABLE if phase in row.phases) for phase in MissionPhase}

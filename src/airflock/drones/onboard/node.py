@@ -4,11 +4,13 @@ autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) retu
 give the same outputs to the bit, so that a log can be flown again.
 """
 
+import re
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from airflock.core import State
 from airflock.drones.mavlink import orders
-from airflock.drones.mavlink.autopilots import TAKE_OFF_COMMAND, Autopilot, AutopilotCommands
+from airflock.drones.mavlink.autopilots import TAKE_OFF_COMMAND, AutopilotCommands, ParameterCheck
 from airflock.drones.mavlink.messages import STATUS_MESSAGE, DroneStatus, parse_status_payload, status_message
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketReceiver, PacketSigner
@@ -21,21 +23,18 @@ from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseV
 # ---- Outgoing messages
 
 ORIGIN_MESSAGE = 49
+POSITION_MESSAGES = (32, 33)
 UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, the largest value of a packet
 
 
-def requests(commands: AutopilotCommands, autopilot: Autopilot, link: AutopilotLink) -> list[bytes]:
-    """Return requests to the autopilot for missing parameters, origin and streams."""
-    messages = [
-        commands.request_parameter(guard.name)
-        for guard in autopilot.parameter_checks
-        if guard.name not in link.parameters
-    ]
+def requests(
+    commands: AutopilotCommands, link: AutopilotLink, checks: Iterable[ParameterCheck], streams: Iterable[int]
+) -> list[bytes]:
+    """Return requests to the autopilot for parameters that are not known, the origin, and these streams."""
+    messages = [commands.request_parameter(check.name) for check in checks if check.name not in link.parameters]
     if link.origin is None:
         messages.append(commands.request_message(ORIGIN_MESSAGE))
-    if link.state is None or link.is_landed is None or not link.clock_offsets:
-        messages += commands.request_streams()
-    return messages
+    return messages + commands.request_streams(streams)
 
 
 def own_status(
@@ -60,6 +59,7 @@ def own_status(
 
 # ---- Node
 
+QUANTITY = re.compile(r"[-+]?\d+(\.\d+)? (?=Hz|m|km|s|%)")
 RETRY_PERIOD = 1.0  # s between two tries of a command
 KILL_SECONDS = 3.0  # s at least for which a kill is repeated to an autopilot that is armed
 PREFLIGHT_PHASES = frozenset({MissionPhase.BOOT, MissionPhase.READY, MissionPhase.CLEARED})
@@ -121,6 +121,8 @@ class Node:
         self._takeoff_at: float | None = None
         self._stream_since: float | None = None
         self._command_at, self._heartbeat_at, self._request_at = -1e9, -1e9, -1e9
+        self._restarts, self._has_flown = 0, False
+        self._overdue: list[int] = []  # streams of the autopilot that are not heard
         self._overload_count = 0
         self._standing_velocity: Velocity | None = None  # what keeps it where it stopped for somebody who is not heard
         self._reported_missing: tuple[str, ...] = ()
@@ -197,6 +199,11 @@ class Node:
         # A computer that is overloaded ticks late; the mission counts that like a law that fails.
         late = now - self._last_tick > self.card.safety.late
         self._last_tick = now
+        self._overdue = self.autopilot_link.overdue_streams(now)
+        if self.autopilot_link.restarts != self._restarts:
+            self._restarts, self._request_at = self.autopilot_link.restarts, -1e9
+            self._notes.append("the autopilot has rebooted, or its streams ended: all is requested once more")
+        self._has_flown |= self.phase in FLYING_PHASES and self.autopilot_link.is_landed is False
         out = NodeOutput([], tuple([] for _ in self._radio_periods), [])
         known = self._mission_facts(now, overload=late or self._phase_velocity.failed)
         self._overload_count += known.is_overloaded
@@ -208,7 +215,13 @@ class Node:
             # give it to the next one.
             if known.order in orders.CALL_OFF_ORDERS and step.row.number != "23" and self.phase in FLYING_PHASES:
                 self.operator.again(known.order)  # something else came first at this tick
-        # A kill that could not be done now must not strike later, when the pilot has given the
+        if known.order == OrderKind.GOTO and self.phase != MissionPhase.GOTO:
+            self._notes.append(f"the point that was ordered is not followed in {self.phase.name}")
+        # A resume must not be followed minutes later, once the pilot has taken off.
+        if known.resume_ordered and self.phase == MissionPhase.MANUAL and (known.is_landed or not known.is_high):
+            self.operator.resume_ordered = False
+            self._notes.append("not resumed: the drone stands, or is below the fence; it takes off by a start only")
+        # Neither must a kill that could not be done now, when the pilot has given the
         # drone back.
         if known.kill_confirmed and self.phase != MissionPhase.DONE:
             self.operator.kill_confirmed = False
@@ -216,7 +229,7 @@ class Node:
         self.peers.member_joined = False
         self._report_missing(known)
         self._steer(now, known, out)
-        self._speak(now, out)
+        self._speak(now, known, out)
         out.notes.extend(self._notes)
         self._notes.clear()
         return out
@@ -234,7 +247,7 @@ class Node:
             order = None
             self._notes.append("the point that was ordered lies outside the fence; not followed")
         elif order == OrderKind.GOTO:
-            self._phase_velocity.goal, self.operator.held = self.operator.goal, False
+            self._phase_velocity.goal = self.operator.goal
         if order == OrderKind.RESUME and self.phase != MissionPhase.MANUAL:
             self.operator.resume_ordered = False
         tick = NodeTick(
@@ -244,6 +257,7 @@ class Node:
             phase_before_hold=self._phase_before_hold,
             home=self.home,
             has_twin=self._has_twin,
+            has_flown=self._has_flown,
             order=order,
             is_overloaded=overload,
             overload_count=self._overload_count,
@@ -264,18 +278,22 @@ class Node:
         was = self.phase
         self._notes.append(f"{was.name} → {to.name}: {event}")
         if to == MissionPhase.HOLD and was in FLYING_PHASES:
-            self._phase_before_hold = MissionPhase.GATHER if was == MissionPhase.TAKEOFF else was
+            self._phase_before_hold = was
+        elif was == MissionPhase.HOLD:
+            self._phase_before_hold = MissionPhase.FLOCK
         elif to == MissionPhase.HOLD:
             self._phase_before_hold, self.operator.held, self.operator.resume_ordered = MissionPhase.FLOCK, True, False
         if to == MissionPhase.ARMING:
             assert self.autopilot_link.state is not None
             self.operator.held = self.operator.resume_ordered = False
             self.home = (self.autopilot_link.state.x, self.autopilot_link.state.y, self.card.layer(self.member))
-        if was == MissionPhase.ARMING and to == MissionPhase.READY:
+        if was not in PREFLIGHT_PHASES and to == MissionPhase.READY:
             self.operator.start_at = None
-            out.autopilot.append(self._speaker.arm(False))
+            if was == MissionPhase.ARMING:
+                out.autopilot.append(self._speaker.arm(False))
         if was == MissionPhase.ARMING and to == MissionPhase.TAKEOFF:
             self._takeoff_at, self._overload_count = now, 0
+        self.operator.held &= to != MissionPhase.GOTO
         if to in (MissionPhase.FLOCK, MissionPhase.GOTO) and was not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             self._phase_velocity.begin(now)
         # A node that was restarted in flight does not know its home: the place where it begins to
@@ -291,10 +309,12 @@ class Node:
             if self.phase == MissionPhase.FAULT
             else mission_facts.missing
             if self.phase in PREFLIGHT_PHASES
-            else ()
+            else mission_facts.bad_streams
         )
         if missing != self._reported_missing:
-            self._notes += [f"missing: {line}" for line in missing if line not in self._reported_missing]
+            # A line whose quantity alone has changed is no news: some change at each tick.
+            reported = {QUANTITY.sub("", line) for line in self._reported_missing}
+            self._notes += [f"missing: {line}" for line in missing if QUANTITY.sub("", line) not in reported]
             self._reported_missing = missing
 
     # ------------------------------------------------------------------------------------------------- steering
@@ -332,8 +352,10 @@ class Node:
             out.autopilot.append(
                 say.arm(True) if mission_facts.in_guided_mode else say.set_mode(self.card.autopilot.ours)
             )
-        if phase == MissionPhase.TAKEOFF and not self.card.autopilot.takes_off_by_setpoints:
-            if self._may_retry(now):  # setpoints would end the climb that the autopilot flies by itself
+        # Setpoints would end the climb that ArduPilot flies by itself; after a HOLD they lift it.
+        first_climb = self._phase_since == self._takeoff_at
+        if phase == MissionPhase.TAKEOFF and first_climb and not self.card.autopilot.takes_off_by_setpoints:
+            if self._may_retry(now):
                 out.autopilot.append(say.command(TAKE_OFF_COMMAND, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self._climb_height()))
             return
         self._stream_since = now if self._stream_since is None else self._stream_since
@@ -341,7 +363,9 @@ class Node:
         flying = self.peers.flying() if phase == MissionPhase.RETURN else {}
         near = [peer.state for peer in flying.values() if peer.state is not None]
         at = SteeringInput(now, phase, self.home, self._standing_velocity, near, mission_facts.has_navigation)
-        self.command = NO_VELOCITY if own is None else self._phase_velocity.velocity(own, at)
+        # Only a take-off may lift a drone that stands: PX4 climbs by any setpoint.
+        stands = mission_facts.is_landed and phase != MissionPhase.TAKEOFF
+        self.command = NO_VELOCITY if own is None or stands else self._phase_velocity.velocity(own, at)
         out.autopilot.append(say.velocity(self.command, round(now * 1e3)))
 
     def _climb_height(self) -> float:
@@ -357,14 +381,18 @@ class Node:
 
     # ------------------------------------------------------------------------------------------------- speaking
 
-    def _speak(self, now: float, out: NodeOutput) -> None:
+    def _speak(self, now: float, mission_facts: MissionFacts, out: NodeOutput) -> None:
         """Send heartbeat, requests to the autopilot, and the own status on every radio that is due."""
         if now - self._heartbeat_at >= RETRY_PERIOD - TIME_TOLERANCE:
             self._heartbeat_at = now
             out.autopilot.append(self._speaker.heartbeat())
-        if now - self._request_at >= RETRY_PERIOD - TIME_TOLERANCE and self.phase in PREFLIGHT_PHASES:
-            self._request_at = now
-            out.autopilot.extend(requests(self._speaker, self.card.autopilot, self.autopilot_link))
+        # In flight, too: there a stream that ends, or that somebody slows down, is needed most.
+        if now - self._request_at >= RETRY_PERIOD - TIME_TOLERANCE and self.phase != MissionPhase.FAULT:
+            streams = dict.fromkeys((*self._overdue, *(POSITION_MESSAGES if mission_facts.bad_streams else ())))
+            checks = self.card.autopilot.parameter_checks if self.phase in PREFLIGHT_PHASES else ()
+            messages = requests(self._speaker, self.autopilot_link, checks, streams)
+            self._request_at = now if messages else self._request_at
+            out.autopilot.extend(messages)
         due = [k for k, at in enumerate(self._next_status) if now >= at - TIME_TOLERANCE]
         if not due:
             return

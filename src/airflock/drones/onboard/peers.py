@@ -8,7 +8,7 @@ from math import isfinite, sqrt
 from typing import Any
 
 from airflock.core import State
-from airflock.drones.mavlink.autopilots import ARMED_FLAG, Autopilot
+from airflock.drones.mavlink.autopilots import ARMED_FLAG, STREAM_RATES, Autopilot
 from airflock.drones.mavlink.frames import FrameStream, MavlinkFrame
 from airflock.drones.mavlink.messages import DroneStatus
 from airflock.drones.mavlink.orders import CALL_OFF_ORDERS, OperatorOrder, OrderKind, parse_order
@@ -218,6 +218,11 @@ INVALID_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: ground stations and companions
 CLOCK_SAMPLES = 10  # samples of the autopilot's clock that are kept
 REBOOT_MS = 2000  # ms; messages that overtake each other differ by less
 MOVING_SPEED = 0.3  # m/s; who flies faster than this cannot stay at the same place
+STREAM_SILENCE = 2.0  # s; a stream that is older is requested once more: the slowest has 1 Hz
+RATE_SPAN = 2.0  # s over which the rate of the own position is measured: about one hiccup of a computer
+# A stream at exactly the needed rate jitters: a fifth less is still accepted.
+RATE_SHARE = 0.8
+FIGURE_COUNT = 5  # arrivals that give the figure of a rate which is too low
 
 
 class AutopilotLink:
@@ -228,6 +233,8 @@ class AutopilotLink:
     state         : own position and velocity, local
     state_at      : time at which the state arrived, s; -1e9: never
     far           : distance (m) from the site of the last position that was refused as too far away; 0: none
+    arrivals      : time at which each stream of STREAM_RATES was heard last, s, by number of its message
+    restarts      : number of times that the autopilot seems to have rebooted on the ground
     refused       : number of frames with implausible content
     other_systems : system ids of other autopilots on this wire
     """
@@ -248,7 +255,9 @@ class AutopilotLink:
         self.parameters: dict[str, float] = {}
         self.clock_offsets: list[float] = []
         self.other_systems: set[int] = set()
-        self.refused = 0
+        self.arrivals: dict[int, float] = {}
+        self.restarts = self.refused = 0
+        self._state_times: deque[float] = deque(maxlen=32)
         self.far = 0.0
         self._max_jump = 5.0
         self._boot_ms = 0
@@ -266,12 +275,39 @@ class AutopilotLink:
                 self._take(frame, now, utc)
 
     def _take(self, frame: MavlinkFrame, now: float, utc: int) -> None:
+        if frame.message in STREAM_RATES:
+            self.arrivals[frame.message] = now
         handler = self._HANDLERS.get(frame.message)
         if handler is not None and not handler(self, frame.values(), now, utc):
             self.refused += 1
 
+    def overdue_streams(self, now: float) -> list[int]:
+        """Return the messages that are not heard, or no longer; all that it knew is forgotten if none is heard.
+
+        An autopilot that reboots forgets the requested streams and sends heartbeats only: no message with its time
+        since boot would say so.
+        """
+        overdue = [n for n in STREAM_RATES if now - self.arrivals.get(n, -1e9) > STREAM_SILENCE]
+        alive = now - self.heartbeat_at <= STREAM_SILENCE
+        if len(overdue) == len(STREAM_RATES) and self.arrivals and alive and not self.armed:
+            self._forget(0)
+        return overdue
+
+    def low_rate(self, needed: float, now: float) -> float | None:
+        """Return the rate (1/s) of the own state if it is lower than needed; None if not, or in the first second."""
+        latest = list(self._state_times)[-round(needed * RATE_SHARE * RATE_SPAN) - 1 :]
+        if not latest or now - latest[-1] > STREAM_SILENCE:
+            return None
+        # Up to the last arrival: a fast stream that has ended is not slow.
+        span = latest[-1] - latest[0]
+        if span < 0.5 * RATE_SPAN or len(latest) >= needed * RATE_SHARE * span:
+            return None
+        # The last arrivals alone: when a fast stream becomes slow, an average says neither rate.
+        latest = latest[-FIGURE_COUNT:]
+        return (len(latest) - 1) / max(latest[-1] - latest[0], 1e-3)
+
     def _boots(self, since_boot: int) -> None:
-        """Forget all values after an autopilot has rebooted on the ground, so that they are requested once more.
+        """Forget all values if the autopilot has rebooted on the ground, so that they are requested once more.
 
         since_boot : time since boot in a message, ms; a step back by more than REBOOT_MS means a reboot
         """
@@ -279,10 +315,16 @@ class AutopilotLink:
         if since_boot >= self._boot_ms - REBOOT_MS:
             self._boot_ms = max(since_boot, self._boot_ms)
         elif not self.armed:
-            self._boot_ms, self.state, self.state_at = since_boot, None, -1e9
-            self.global_state, self.global_at, self.origin, self.is_landed = None, -1e9, None, None
-            self.fix_type, self.horizontal_accuracy, self.battery = 0, 1e9, None
-            self.parameters, self.clock_offsets = {}, []
+            self._forget(since_boot)
+
+    def _forget(self, boot_ms: int) -> None:
+        """Forget what an autopilot may have changed by a reboot, at a time since its boot (ms)."""
+        self.restarts += 1
+        self._boot_ms, self.state, self.state_at = boot_ms, None, -1e9
+        self.global_state, self.global_at, self.origin, self.is_landed = None, -1e9, None, None
+        self.fix_type, self.horizontal_accuracy, self.battery = 0, 1e9, None
+        self.parameters, self.clock_offsets, self.arrivals = {}, [], {}
+        self._state_times.clear()
 
     def _heartbeat(self, v: dict[str, Any], now: float, utc: int) -> bool:
         self.kind, self.mode, self.armed = v["autopilot"], v["custom_mode"], bool(v["base_mode"] & ARMED_FLAG)
@@ -355,7 +397,10 @@ class AutopilotLink:
 
     def _moved(self, state: State, now: float) -> None:
         """Take a new own state, unless it has a velocity but an unchanged position: then the estimate is frozen."""
-        last, passed = self.state, now - self.state_at
+        last, passed, times = self.state, now - self.state_at, self._state_times
+        if times and now - times[-1] > STREAM_SILENCE:  # a rate is measured since the stream began
+            times.clear()
+        times.append(now)
         # A frozen estimate keeps sending: without this it would look fresh for ever.
         if last is not None and last[:3] == state[:3] and max(map(abs, state[3:])) > MOVING_SPEED:
             return

@@ -4,13 +4,20 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from airflock.core import State, norm
+from airflock.drones.mavlink.autopilots import STREAM_RATES
+from airflock.drones.mavlink.frames import common_dialect
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import FLYING_PHASES, MissionFacts, MissionPhase
-from airflock.drones.onboard.peers import HEARD_WITHIN, AutopilotLink, OperatorOrders, Peer, Peers
+from airflock.drones.onboard.peers import HEARD_WITHIN, STREAM_SILENCE, AutopilotLink, OperatorOrders, Peer, Peers
 
 STANDING_SPEED = 0.5  # m/s; faster than this a drone does not stand, nor begin to land
 MAX_HEARTBEAT_AGE = 3.0  # s; an autopilot that says nothing for longer is not there
+# Some requests, one a second, may be lost before the flight has to do without a stream.
+MAX_STREAM_AGE = 5.0  # s
+POSITION_RATE = 10.0  # 1/s; needed at most: half of what is requested
+LANDED_MESSAGE = 245
+LAYER_TOLERANCE = 0.5  # m
 NO_HEARTBEAT_TEXT = (
     "no heartbeat from the autopilot: is it on, its port and baud rate right, and does it speak MAVLink 2?"
 )
@@ -24,6 +31,7 @@ class NodeTick(NamedTuple):
     now, utc : own clock, s, and Unix time, µs
     home     : position where it armed, in its own layer, m; None before
     has_twin : another sender signs as this member
+    has_flown : it was in the air in a phase in which this node flies it
     """
 
     now: float
@@ -32,6 +40,7 @@ class NodeTick(NamedTuple):
     phase_before_hold: MissionPhase
     home: tuple[float, float, float] | None
     has_twin: bool
+    has_flown: bool
     order: OrderKind | None
     is_overloaded: bool
     overload_count: int
@@ -56,6 +65,24 @@ class ConditionTimers:
         return max(now - self._since.setdefault(name, now), 1e-9)
 
 
+def bad_streams(card: FlightCard, link: AutopilotLink, now: float) -> tuple[str, ...]:
+    """Return the streams of the autopilot that are too slow or silent, one line each; not those never heard."""
+    # A state for each tick and each packet; a faster one is not needed.
+    needed = min(POSITION_RATE, 1.0 / max(card.safety.tick, card.safety.status_period))
+    rate = link.low_rate(needed, now)
+    lines = [
+        f"{common_dialect().mavlink_map[number].msgname}: the autopilot has sent none for {MAX_STREAM_AGE:g} s"
+        for number in STREAM_RATES
+        if now - link.arrivals.get(number, now) > MAX_STREAM_AGE
+    ]
+    if rate is not None:
+        lines.append(
+            f"own position at {rate:.1f} Hz, {needed:g} needed: is MAVProxy between? Start it with --streamrate=-1; "
+            "other ground stations and the SRn_ parameters set such rates, too"
+        )
+    return tuple(lines)
+
+
 def missing_before_start(
     card: FlightCard, member: int, link: AutopilotLink, peers: Peers, utc: int, now: float
 ) -> tuple[str, ...]:
@@ -70,7 +97,7 @@ def missing_before_start(
     missing += (
         _missing_parameters(card, member, link) + _missing_state(card, link, now) + _missing_clock(card, link, peers)
     )
-    return (*missing, *_missing_peers(card, link, peers, now))
+    return (*missing, *bad_streams(card, link, now), *_missing_peers(card, link, peers, now))
 
 
 def _missing_parameters(card: FlightCard, member: int, wire: AutopilotLink) -> list[str]:
@@ -191,6 +218,12 @@ def mission_facts(
     # Hysteresis: HOLD ends only after all reasons have been absent for a while (row 25).
     calm = not (position_bad or gnss_bad or few or clock_bad or near or tick.is_overloaded)
     calm = calm and not (operator_lost and s.operator_lost == "hold")
+    streams = bad_streams(card, link, now)
+    # The way home can be flown by slow streams: standing until the battery ends is worse.
+    calm = calm and (not streams or tick.phase_before_hold == MissionPhase.RETURN)
+    # What was said of the ground before its stream ended need not hold.
+    landed = link.is_landed if now - link.arrivals.get(LANDED_MESSAGE, now) <= STREAM_SILENCE else None
+    stands = landed is True and phase in FLYING_PHASES and phase != MissionPhase.TAKEOFF
     missing = (
         missing_before_start(card, member, link, peers, tick.utc, now)
         if phase in (MissionPhase.READY, MissionPhase.CLEARED)
@@ -207,7 +240,10 @@ def mission_facts(
         in_guided_mode=link.mode == card.autopilot.ours,
         in_land_mode=link.mode == card.autopilot.land,
         armed=bool(link.armed),
-        is_landed=bool(link.is_landed),
+        is_landed=landed is True,
+        is_airborne=landed is False,
+        is_high=own is None or own.z > card.low - LAYER_TOLERANCE,
+        has_flown=tick.has_flown,
         has_good_navigation=not (position_bad or gnss_bad),
         order=tick.order,
         kill_confirmed=operator.kill_confirmed,
@@ -215,6 +251,8 @@ def mission_facts(
         held=operator.held,
         position_bad_for=position_bad,
         gnss_bad_for=gnss_bad,
+        landed_for=timers("landed", stands, now),
+        bad_streams=streams,
         battery_critical=battery < s.battery_critical,
         battery_needed_home=battery < s.battery_low + s.battery_way * way * 1e-3,
         outside_for=timers("outside", out, now),
@@ -232,7 +270,7 @@ def mission_facts(
         due=operator.due(tick.utc, card.turn(member)),
         setpoints_for=tick.setpoints_for,
         phase_for=tick.phase_for,
-        at_layer=own is not None and abs(own.z - layer) < 0.5,
+        at_layer=own is not None and abs(own.z - layer) < LAYER_TOLERANCE,
         is_climbing=own is not None and own.vz > 0.2,
         neighbour_near=near,
         have_gathered=phase == MissionPhase.GATHER and _have_gathered(card, own, peers, now),
