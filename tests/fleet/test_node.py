@@ -19,6 +19,7 @@ from airflock.drones.onboard.card import card_hash, parse_card, read_card, write
 from airflock.drones.onboard.flight_log import LoggingNode, read_node_memory, replay
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import Node, NodeMemory, own_status
+from airflock.fleets.drone_faults import InjectedFault
 from airflock.fleets.lockstep import START_TIME
 from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.fleets.vehicle import SoftwareVehicle
@@ -121,6 +122,209 @@ def test_a_neighbour_that_jumps_is_not_believed():
         made = DroneStatus(utc, (x, 0.0, 20.0), (4.0, 0.0, 0.0), 1.0, 6, True, 7, bytes.fromhex(CARD.hash)[:4])
         node.radio(sign(status_message(made, CARD.site), utc), 0.1 * (k + 1))
     assert node.peers.refused["jump"] == 1 and node.peers.all[2].status.position[0] == pytest.approx(11.5, abs=0.02)
+
+
+# --------------------------------------------------------------------------------------- what the autopilot says
+
+# Messages as measured on ArduCopter 4.6.0-dev in software in the loop.
+WELL, PREARM_FAILS = 0x57719C2F, 0x47719C2F  # health in SYS_STATUS; the latter before the fence has a position
+ENABLED, PRESENT, BATTERY = 0x52719C2F, 0x5371FC2F, 1 << 25
+THROTTLE = b"Arm: Throttle (RC3) is not neutral"
+
+
+def sys_status(health=WELL, millivolts=12600):
+    return common.MAVLink_sys_status_message(PRESENT, ENABLED, health, 0, millivolts, 0, 100, 0, 0, 0, 0, 0, 0)
+
+
+def arducopter(members=(1,), **more):
+    """The node of a lone drone and its ArduCopter, with nothing missing."""
+    found = scenario(len(members))
+    made = document(found, autopilot="ardupilot", members=members, **more)
+    flown = parse_card({**made, "hash": card_hash(made)})
+    node = Node(flown, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
+    vehicle = SoftwareVehicle(
+        "ardupilot", 1, flown.site, (0.0, 0.0, 0.0), found.vehicle, found.body, started=START_TIME
+    )
+    return node, vehicle
+
+
+def notes_of(node, *messages, now, system=1):
+    """Notes of the tick after these messages of the autopilot."""
+    pack = FramePacker(system, 1)
+    for message in messages:
+        node.autopilot(pack(message), now)
+    return node.tick(now).notes
+
+
+def test_a_refusal_to_arm_is_reported_once_at_each_start_with_its_reason_within_two_seconds():
+    node, vehicle = arducopter()
+    live(node, vehicle, 0.0, 4.0)
+    for begin in (10.0, 40.0):
+        node.phase, vehicle.mode = MissionPhase.CLEARED, "PILOT"
+        node.operator.start_at = START_TIME + round(1e6 * begin)
+        notes, t = [], begin
+        while t < begin + 8.0:
+            node.autopilot(vehicle.due_telemetry(t), t)
+            for data in node.tick(t).autopilot:
+                arms = [f for f in frames_in(data) if f.message == 76 and f.values()["command"] == 400]
+                if arms:
+                    ack = common.MAVLink_command_ack_message(400, 4, 0, 0, 1, 191)
+                    text = common.MAVLink_statustext_message(2, THROTTLE)
+                    notes.append([(t, note) for note in notes_of(node, ack, text, now=t)])
+                else:
+                    node.autopilot(vehicle.receive(data, t), t)
+            t = round(t + 0.2, 6)
+        (first, first_note), *others = [row for each in notes for row in each]
+        assert len(notes) > 3 and first < begin + 1.5 + 2.0
+        assert [first_note] + [note for _, note in others] == [
+            "the autopilot refuses to arm or disarm: failed", f"autopilot: {THROTTLE.decode()}",
+        ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("message", "notes"), [
+    (common.MAVLink_command_ack_message(400, 4, 0, 0, 1, 190), []),  # of a ground station
+    (common.MAVLink_command_ack_message(400, 5, 0, 0, 1, 191), []),  # in progress
+    (common.MAVLink_command_ack_message(511, 3, 0, 0, 1, 191), []),  # streams have lines of their own
+    (common.MAVLink_command_ack_message(176, 2, 0, 0, 1, 191), ["the autopilot refuses the mode: denied"]),
+    (common.MAVLink_command_ack_message(22, 99, 0, 0, 1, 191), ["the autopilot refuses to take off: 99"]),
+    (common.MAVLink_statustext_message(6, b"EKF3 IMU0 is using GPS"), []),
+    (common.MAVLink_statustext_message(4, b"Battery 1 is low"), ["autopilot: Battery 1 is low"]),
+    (common.MAVLink_statustext_message(2, b"a\x1b[2Jb\nc"), ["autopilot: a\\x1b[2Jb\\nc"]),
+])  # fmt: skip
+def test_what_concerns_the_flight_is_one_printable_line(message, notes):
+    node, _ = arducopter()
+    node.tick(0.0)
+    assert notes_of(node, message, now=0.2) == notes and notes_of(node, message, now=0.4) == []
+
+
+@pytest.mark.parametrize(("health", "millivolts", "line"), [
+    (PREARM_FAILS, 12600, "missing: the autopilot's own checks before arming fail"),
+    (WELL & ~BATTERY, 9500, "missing: battery: the autopilot reports it low or bad at 9.5 V"),
+    (WELL & ~BATTERY, 65535, "missing: battery: the autopilot reports it low or bad"),
+])  # fmt: skip
+def test_nothing_is_cleared_while_the_autopilot_itself_reports_a_reason(health, millivolts, line):
+    node, vehicle = arducopter()
+    live(node, vehicle, 0.0, 4.0)
+    assert node.phase == MissionPhase.CLEARED
+    vehicle.rates["sys_status"] = 0.0
+    notes = notes_of(node, sys_status(health, millivolts), now=4.0)
+    assert [note.startswith(line) for note in notes if note.startswith("missing")] == [True], notes
+    assert live(node, vehicle, 4.2, 5.0) == [] and node.phase == MissionPhase.READY
+    assert notes_of(node, sys_status(), now=5.0) == ["READY → CLEARED: nothing is missing"]
+
+
+def test_a_battery_low_by_voltage_sends_a_drone_home_at_full_per_cent():
+    f = fleet(scenario(3, duration=300.0), autopilot="ardupilot")
+    f.advance(12.0)
+    f.order(OrderKind.START, at=12.0)
+    f.advance(25.0)
+    assert f.nodes[0].phase == MissionPhase.FLOCK
+    f.vehicles[0].rates["sys_status"] = 0.0
+    for millivolts in (9500, 9490):
+        f.nodes[0].autopilot(FramePacker(1, 1)(sys_status(WELL & ~BATTERY, millivolts)), f.now)
+    f.advance(0.4)
+    lines = [note for _, who, note in f.log if who == 1 and "battery" in note]
+    assert lines[0] == "battery: the autopilot reports it low or bad at 9.5 V" and "RETURN" in lines[1], lines
+    assert f.nodes[0].phase == MissionPhase.RETURN and f.nodes[0].autopilot_link.battery == 100.0
+
+
+def test_a_landing_by_a_failsafe_of_the_autopilot_is_no_pilot():
+    """Without satellites ArduCopter landed by itself 8 s later, before the 10 s of the node's own rule."""
+    for failsafe, phase in ((True, MissionPhase.LAND), (False, MissionPhase.MANUAL)):
+        f = fleet(scenario(3, duration=300.0), autopilot="ardupilot")
+        f.advance(12.0)
+        f.order(OrderKind.START, at=12.0)
+        f.advance(25.0)
+        node, vehicle = f.nodes[1], f.vehicles[1]
+        vehicle.mode, vehicle.rates["heartbeat"] = "LAND", 0.0
+        state = 5 if failsafe else 4  # MAV_STATE_CRITICAL, MAV_STATE_ACTIVE
+        node.autopilot(FramePacker(2, 1)(common.MAVLink_heartbeat_message(2, 3, 128 | 1, 9, state, 3)), f.now)
+        f.advance(0.4)
+        last = [note for _, who, note in f.log if who == 2][-1]
+        assert node.phase == phase and ("by a failsafe of its own" in last) == failsafe, last
+
+
+def test_after_a_jump_a_drone_holds_until_the_operator_resumes_though_both_positions_agree_again():
+    f = fleet(scenario(3, duration=300.0))
+    f.advance(12.0)
+    f.order(OrderKind.START, at=12.0)
+    f.advance(25.0)
+    node, vehicle = f.nodes[2], f.vehicles[2]
+    vehicle.error = (22.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    f.advance(30.0)
+    assert node.phase == MissionPhase.HOLD and node.autopilot_link.position_disagreement(f.now) < 0.1
+    assert [note for _, who, note in f.log if who == 3 and "the position jumped" in note]
+    f.order(OrderKind.RESUME, target=3)
+    f.advance(5.0)
+    assert node.phase == MissionPhase.FLOCK
+
+
+@pytest.mark.parametrize(("value", "is_safe"), [(1, True), (255, False)])
+def test_the_later_name_of_a_parameter_counts_as_the_parameter(value, is_safe):
+    node, vehicle = arducopter()
+    del vehicle.parameters["SYSID_MYGCS"]
+    vehicle.parameters["MAV_GCS_SYSID"] = value
+    notes = live(node, vehicle, 0.0, 4.0)
+    assert (node.phase == MissionPhase.CLEARED) == is_safe
+    line = "missing: SYSID_MYGCS or MAV_GCS_SYSID = 255 is not within [1, 1]"
+    assert any(note.startswith(line) for note in notes) != is_safe, notes
+
+
+def test_the_numbers_that_the_per_cent_of_a_battery_rest_on_are_reported():
+    node, vehicle = arducopter()
+    vehicle.parameters["BATT_CAPACITY"] = 3300.0
+    notes = live(node, vehicle, 0.0, 4.0)
+    assert [note for note in notes if note.startswith("BATT_CAPACITY = 3300: capacity in mAh")], notes
+
+
+# --------------------------------------------------------------------------------------------------- whose clock
+
+
+def test_the_clock_of_an_autopilot_in_the_loop_keeps_nobody_from_flying():
+    """It began 0.92 s before the computer's clock; each of five was off by another 0.1 to 1.1 s."""
+    node, vehicle = arducopter()
+    vehicle.start_time = START_TIME - 920_000
+    notes = live(node, vehicle, 0.0, 2.0)
+    assert any("the autopilot's clock is -0.92 s off this computer's" in note for note in notes), notes
+    live(node, vehicle, 2.0, 4.0)
+    assert node.phase == MissionPhase.CLEARED
+    f = fleet(scenario(3, duration=300.0), autopilot="ardupilot")
+    for vehicle, off in zip(f.vehicles, (-0.1, -0.92, -1.1), strict=True):
+        vehicle.start_time = START_TIME + round(1e6 * off)
+    f.advance(12.0)
+    f.order(OrderKind.START, at=12.0)
+    f.advance(40.0)
+    assert set(f.phases()) == {MissionPhase.FLOCK}, f.log
+
+
+@pytest.mark.parametrize("off", [-0.6, 0.6, 3.0])
+@pytest.mark.parametrize("drifting", [False, True])
+def test_a_computer_whose_clock_is_off_does_not_start_whatever_the_autopilots_say(off, drifting):
+    f = fleet(scenario(3, duration=300.0), autopilot="ardupilot", faults=[InjectedFault("clock", (2,), amount=off)])
+    for vehicle in f.vehicles if drifting else ():
+        vehicle.start_time = START_TIME - 300_000
+    f.advance(12.0)
+    f.order(OrderKind.START, at=12.0)
+    f.advance(20.0)
+    assert f.nodes[1].phase == MissionPhase.READY
+    assert any(note.startswith("missing: clock: ") for _, who, note in f.log if who == 2), f.log
+
+
+def test_in_the_air_a_drift_is_explained_and_a_step_is_not():
+    """100 ppm reach 0.2 s after 33 min; a step of 0.5 s is no drift, whatever the other drones say."""
+    f = fleet(scenario(3, duration=300.0), autopilot="ardupilot")
+    f.advance(12.0)
+    f.order(OrderKind.START, at=12.0)
+    f.advance(25.0)
+    node, vehicle = f.nodes[0], f.vehicles[0]
+    for _ in range(40):
+        vehicle.start_time -= 20_000  # 40 times 0.02 s within 40 s: 200 times as quick as a crystal
+        f.advance(1.0)
+    assert node.phase == MissionPhase.FLOCK and node.autopilot_link.clock_offset() < -0.5
+    vehicle.start_time += 500_000
+    f.advance(3.0)
+    assert node.phase == MissionPhase.HOLD
+    assert any("HOLD: a suspicious clock" in note for _, who, note in f.log if who == 1)
 
 
 # -------------------------------------------------------------------------------------------------- who is obeyed
@@ -303,6 +507,7 @@ def test_a_law_that_fails_in_flight_holds_and_then_returns(monkeypatch):
     node, vehicle = f.nodes[0], f.vehicles[0]
     node.phase, node.home, vehicle.armed, vehicle.mode = MissionPhase.FLOCK, (0.0, 0.0, 10.0), True, "OURS"
     vehicle.state, vehicle.setpoint_at = vehicle.state._replace(z=20.0), 1.0
+    node.autopilot_link.state = None  # it is put there by hand, which is no jump
     monkeypatch.setattr(node.pilot, "decide", lambda *a, **k: 1 / 0)
     f.advance(20.0)
     notes = [note for _, who, note in f.log if who == 1]

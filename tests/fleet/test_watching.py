@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import airflock
 from airflock.cli.main import app
 from airflock.core.agent import State
-from airflock.drones.mavlink.messages import CHANNEL_SYSTEM, HEARS_REPORT, parse_report, report_message
+from airflock.drones.mavlink.messages import CHANNEL_SYSTEM, HEARS_REPORT, parse_report, report_message, text_messages
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketSigner, write_key
 from airflock.drones.onboard.card import read_card
@@ -23,7 +23,7 @@ from airflock.fleets import compare
 from airflock.fleets.drone_faults import INJECTED_KINDS, DroneFaults, InjectedFault
 from airflock.fleets.fleet_observer import SCENARIO_FAULT_NAMES, FleetObserver, TelemetryBroadcast
 from airflock.fleets.lockstep import START_TIME, OperatorStation, write_card_and_key
-from airflock.fleets.radio_channel import SOFTWARE_KEY
+from airflock.fleets.radio_channel import SOFTWARE_KEY, RadioChannel
 from airflock.fleets.realtime import fly_in_realtime
 from airflock.studio.fleet_page import drone_html, faults_html, fleet_warning, members_html, notes_html
 from airflock.studio.live_page import open_card_and_radios
@@ -97,6 +97,29 @@ def test_any_bytes_are_refused_without_a_change(n=300):
     for datagram in genuine:
         observer.take(datagram, f.now)
     assert observer.accepted_count == 3
+
+
+def test_why_a_drone_does_something_stands_on_the_page_once_in_its_own_words():
+    f, observer = watched()
+    text = "a<b> & " + "x" * 80
+    f.nodes[1].autopilot_link.lines.append(text)
+    for _ in range(5):
+        f.advance(0.2)
+        for node in f.nodes:
+            for datagram in (*node.status_datagrams(f.now), *node.tick(f.now).texts):
+                observer.take(datagram, f.now)
+    assert [note.text for note in observer.notes if note.member == 2 and "x" in note.text] == [text]
+    assert "drone 2: a&lt;b&gt; &amp; xxx" in notes_html(observer) and not observer.refused
+
+
+def test_who_sends_false_states_leaves_lines_as_they_are():
+    f, _ = watched()
+    faults = [InjectedFault(kind, (1,), 0.0, 9.0, 30.0) for kind in ("rogue", "impostor")]
+    channel = RadioChannel(f.scenario.transceiver, f.scenario.radio, f.card.members, 0, 0.1, faults, site=f.card.site)
+    line = PacketSigner(SOFTWARE_KEY, 1)(text_messages("no valid position", 1)[0], START_TIME)
+    channel.send(0.0, 0, line)
+    at = [s[:3] for s in START]
+    assert list(channel.deliver(2.0, at)) == [(1, line), (2, line)]
 
 
 def test_another_key_is_told():

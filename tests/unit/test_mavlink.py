@@ -17,7 +17,14 @@ from airflock.drones.mavlink.frames import (
     message_fields,
     message_layout,
 )
-from airflock.drones.mavlink.messages import STATUS_MESSAGE, DroneStatus, parse_status, status_message
+from airflock.drones.mavlink.messages import (
+    STATUS_MESSAGE,
+    DroneStatus,
+    TextPieces,
+    parse_status,
+    status_message,
+    text_messages,
+)
 from airflock.drones.mavlink.signing import (
     MAX_STAMP,
     SIGNING_EPOCH,
@@ -299,3 +306,24 @@ def test_key_files(tmp_path):
         read_key(path)
     with pytest.raises(LinkError, match="the key cannot be read"):
         read_key(tmp_path / "absent")
+
+
+# ---------------------------------------------------------------------------------------------------------- lines
+
+
+@given(st.lists(st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=260), max_size=6), st.data())
+def test_lines_that_are_sent_twice_arrive_once_each_if_every_piece_arrives_once(lines, data):
+    pack, join, arrived = FramePacker(1, 191), TextPieces(), []
+    for number, line in enumerate(lines, 1):
+        pieces = [frames_in(pack(message))[0].values() for message in text_messages(line, number)]
+        lost = data.draw(st.lists(st.sampled_from([None, 0, 1]), min_size=len(pieces), max_size=len(pieces)))
+        for turn in (0, 1):
+            arrived += [join(piece) for piece, gone in zip(pieces, lost, strict=True) if gone != turn]
+    # A piece that is lost the first time leaves the line to the second; an empty line says nothing.
+    assert [text for text in arrived if text is not None] == lines
+
+
+def test_short_texts_of_an_autopilot_are_lines_of_their_own():
+    join = TextPieces()
+    for _ in range(2):
+        assert join({"id": 0, "chunk_seq": 0, "text": "Arm: Throttle (RC3) is not neutral"}) is not None

@@ -17,9 +17,11 @@ from mission_events import EVENTS, fly
 WELL, SAFE = MissionFacts(), SafetyLimits()
 P = MissionPhase
 PILOT = {"in_guided_mode": False}
+FAILSAFE_LANDING = {"in_guided_mode": False, "in_land_mode": True, "in_failsafe": True}
 # number, phase, facts that fire it, next phase; facts of a higher row and where that leads
 ROWS = [
-    ("1", P.FLOCK, PILOT, P.MANUAL, None, None),
+    ("1", P.FLOCK, PILOT, P.MANUAL, FAILSAFE_LANDING, P.LAND),
+    ("1b", P.HOLD, FAILSAFE_LANDING, P.LAND, None, None),
     ("1", P.LAND, {"in_guided_mode": False, "in_land_mode": False}, P.MANUAL, None, None),
     ("2", P.MANUAL, {"resume_ordered": True, "setpoints_for": 2.0}, P.HOLD, None, None),
     ("3", P.MANUAL, {"armed": False}, P.DONE, None, None),
@@ -125,7 +127,8 @@ def test_whatever_goes_wrong_the_pilot_comes_first_and_nothing_on_the_ground_fli
     odd["order"] = data.draw(st.sampled_from([None, *OrderKind]))
     step = at(phase, odd)
     if phase in FLYING_PHASES and not odd["in_guided_mode"]:
-        assert step.next_phase == P.MANUAL
+        lands_itself = odd["armed"] and odd["in_land_mode"] and odd["in_failsafe"]
+        assert step.next_phase == (P.LAND if lands_itself else P.MANUAL)
     if phase in (P.BOOT, P.READY, P.CLEARED, P.DONE, P.FAULT):
         assert step.next_phase not in FLYING_PHASES
         assert step.next_phase != P.ARMING or (phase == P.CLEARED and odd["due"])

@@ -15,6 +15,7 @@ from airflock.drones import (
     HEARD_WITHIN,
     HEARS_REPORT,
     STATUS_MESSAGE,
+    TEXT_MESSAGE,
     ChannelReport,
     DroneStatus,
     FlightCard,
@@ -23,6 +24,7 @@ from airflock.drones import (
     PacketSigner,
     Peer,
     Peers,
+    TextPieces,
     orders,
     parse_order,
     parse_report,
@@ -32,7 +34,7 @@ from airflock.drones import (
 from airflock.fleets.drone_faults import INJECTED_KINDS, InjectedFault
 from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.parts.faults import KINDS as OURS
-from airflock.support import LinkError
+from airflock.support import LinkError, printable
 
 # ---- Telemetry broadcast
 
@@ -125,6 +127,7 @@ class FleetObserver:
         self._clock_zero = utc - round(now * 1e6)
         senders = {
             STATUS_MESSAGE: card.members,
+            TEXT_MESSAGE: card.members,
             orders.TUNNEL_MESSAGE: (orders.OPERATOR_SYSTEM, CHANNEL_SYSTEM),
         }
         spread = card.safety.clock_spread + card.delay
@@ -134,6 +137,7 @@ class FleetObserver:
         self._heard_reports: dict[int, tuple[float, frozenset[int]]] = {}
         self._faults: dict[str, tuple[float, frozenset[int]]] = {}
         self._silent: set[int] = set()
+        self._text_pieces = {member: TextPieces() for member in card.members}
         self._last_order_time = 0  # when the last order was given, µs of Unix time
 
     # ------------------------------------------------------------------------------------------------------ in
@@ -147,6 +151,10 @@ class FleetObserver:
             status = parse_status(got.values, self.card.site)
             if status is not None:
                 self._state(got.system, status, now)
+        elif got.message == TEXT_MESSAGE:
+            text = self._text_pieces[got.system](got.values)
+            if text:
+                self._note(now, got.system, printable(text))
         elif got.system == CHANNEL_SYSTEM:
             self._take_report(parse_report(got.values), now)
         else:

@@ -165,6 +165,7 @@ class RadioChannel:
 
     def send(self, now: float, sender: int, datagram: bytes, positions: Sequence[Position] = ()) -> None:
         """Send a datagram of a drone, by its index, to all; at: true positions, m."""
+        is_status = int.from_bytes(datagram[7:10], "little") == STATUS_MESSAGE
         if self._reaches_all_at_once:
             self._queue_packet(now + self._k.delay, sender, self._others[sender], datagram)
         else:
@@ -175,7 +176,7 @@ class RadioChannel:
                 reached.setdefault(round(now + self._k.delay + late, 6), []).append(to)
             for due, receivers in reached.items():
                 self._queue_packet(due, sender, receivers, datagram)
-        for f in self._attackers:
+        for f in self._attackers if is_status else ():
             if f.holds(self._members[sender], now) and self._site is not None:
                 false = forge_packet(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
                 self._queue_packet(now + self._k.delay, sender, range(len(self._members)), false)

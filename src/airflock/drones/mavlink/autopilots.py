@@ -5,7 +5,7 @@ Commands in Guided Mode and Complete Parameter List. Numbers of commands and mes
 """
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -17,12 +17,14 @@ SET_MODE_COMMAND = 176
 REQUEST_MESSAGE_COMMAND = 512
 MESSAGE_INTERVAL_COMMAND = 511
 TAKE_OFF_COMMAND = 22
+COMMAND_TEXTS = {ARM_COMMAND: "to arm or disarm", SET_MODE_COMMAND: "the mode", TAKE_OFF_COMMAND: "to take off"}
 CUSTOM_MODE_ENABLED = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, first parameter of DO_SET_MODE
 FORCE_DISARM_CODE = 21196.0  # second parameter of ARM: also in the air
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED in HEARTBEAT.base_mode
 VELOCITY_ONLY_MASK = 0x0DC7  # type mask of a setpoint: velocity counts; position, acceleration, yaw and its rate do not
 LOCAL_NED_FRAME = 1  # MAV_FRAME
 INT32_TYPE = 6  # MAV_PARAM_TYPE
+NODE_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 STREAM_RATES = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node requests, 1/s
 
 
@@ -33,6 +35,7 @@ class ParameterCheck(NamedTuple):
     own          : the safe value is the autopilot's own system id
     timeout      : time-out (s) during which the drone flies on; `reason` adds the distance of that flight; 0: none
     unsafe_value : a value inside the range that is not safe
+    later_name   : its name in later versions of the autopilot
     """
 
     name: str
@@ -42,6 +45,16 @@ class ParameterCheck(NamedTuple):
     own: bool = False
     timeout: float = 0.0
     unsafe_value: float | None = None
+    later_name: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return all names under which an autopilot may report it."""
+        return (self.name, self.later_name) if self.later_name else (self.name,)
+
+    def value(self, parameters: Mapping[str, float]) -> float | None:
+        """Return its value among those that an autopilot has reported; None if it has not."""
+        return next((parameters[name] for name in self.names if name in parameters), None)
 
     def range(self, member: int) -> tuple[float, float]:
         """Return the least and the largest value that is safe for a member of a flock."""
@@ -77,6 +90,8 @@ class Autopilot:
     takes_off_by_setpoints : False: it takes off by the command TAKE_OFF once it is armed
     integers_as_bytes      : PARAM_VALUE holds the bytes of an integer (PX4) instead of a converted float
     parameter_checks       : parameters that are checked before the drone arms
+    battery_parameters     : parameters on which its reports of the battery rest, with the meaning of their values;
+                             no value is wrong by itself, so a person reads them
     """
 
     name: str
@@ -87,6 +102,7 @@ class Autopilot:
     takes_off_by_setpoints: bool
     integers_as_bytes: bool
     parameter_checks: tuple[ParameterCheck, ...]
+    battery_parameters: Mapping[str, str]
 
     def mode_parameters(self, mode: int) -> tuple[float, ...]:
         """Return the parameters of DO_SET_MODE for a custom mode."""
@@ -132,6 +148,10 @@ AUTOPILOTS = {
                 unsafe_value=4.0,
             ),
         ),
+        battery_parameters={
+            "BAT1_CAPACITY": "capacity in mAh, on which its per cent rest; -1: on the voltage alone",
+            "COM_LOW_BAT_ACT": "what it does by itself at a low battery; 0: it only warns",
+        },
     ),
     "ardupilot": Autopilot(
         "ardupilot",
@@ -150,9 +170,19 @@ AUTOPILOTS = {
             ),
             ParameterCheck("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),
             ParameterCheck(
-                "SYSID_MYGCS", 1.0, 250.0, "whose heartbeats count: those of the node, of the same system", own=True
+                "SYSID_MYGCS",
+                1.0,
+                250.0,
+                "whose heartbeats count: those of the node, of the same system",
+                own=True,
+                later_name="MAV_GCS_SYSID",  # since Copter 4.7
             ),
         ),
+        battery_parameters={
+            "BATT_CAPACITY": "capacity in mAh, on which its per cent rest: is it that of this battery?",
+            "BATT_LOW_VOLT": "voltage below which it reports a low battery, and the node returns; 0: never",
+            "BATT_FS_LOW_ACT": "what it does by itself at a low battery; 0: nothing, the node alone returns",
+        },
     ),
 }
 
@@ -163,7 +193,7 @@ class AutopilotCommands:
     system : system id of the autopilot; the node is another component of the same system
     """
 
-    def __init__(self, autopilot: Autopilot, system: int, component: int = 191):
+    def __init__(self, autopilot: Autopilot, system: int, component: int = NODE_COMPONENT):
         self.autopilot, self.system, self._pack = autopilot, system, FramePacker(system, component)
 
     def heartbeat(self) -> bytes:

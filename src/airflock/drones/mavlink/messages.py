@@ -6,6 +6,8 @@ carry fields that MAVLink has no place for: version 2, phase, mission (4 bytes),
 lost by rounding, a byte each.
 
 A report is a TUNNEL message about one thing: which drones a drone hears, or which drones a fault affects.
+
+A line for a person, by an autopilot or a node, is one STATUSTEXT, or several where it is longer than 50 letters.
 """
 
 import struct
@@ -121,6 +123,44 @@ def parse_status_payload(payload: bytes, site: FlightSite) -> DroneStatus | None
 
 def _clip(value: float, low: int, high: int) -> int:
     return min(max(round(value), low), high)
+
+
+# ---- Lines for a person
+
+TEXT_MESSAGE = 253  # STATUSTEXT
+TEXT_LENGTH = 50  # letters of one message
+NOTICE = 5  # MAV_SEVERITY
+
+
+def text_messages(text: str, number: int) -> list[Any]:
+    """Return the dialect's messages of a line with a number (1 to 65535); the last one is not full."""
+    data, make = text.encode("ascii", "replace"), common_dialect().MAVLink_statustext_message
+    starts = range(0, len(data) + 1, TEXT_LENGTH)
+    return [make(NOTICE, data[k : k + TEXT_LENGTH], number, k // TEXT_LENGTH) for k in starts]
+
+
+class TextPieces:
+    """Joins the STATUSTEXT messages of one sender; lost ones are taken from a repetition of the line."""
+
+    def __init__(self) -> None:
+        self._number, self._last = 0, (0, "")
+        self._pieces: dict[int, str] = {}
+
+    def __call__(self, values: dict[str, Any]) -> str | None:
+        """Return the line that a message completes; None for a repetition, or where a piece is missing."""
+        number = values["id"]
+        if number == 0:  # a line of one message
+            return str(values["text"])
+        if number != self._number:
+            self._number, self._pieces = number, {}
+        self._pieces[values["chunk_seq"]] = values["text"]
+        count = 1 + max(self._pieces)
+        # MAVLink counts no pieces: the last one is known by the room that is left in it.
+        if len(self._pieces[count - 1]) == TEXT_LENGTH or len(self._pieces) < count:
+            return None
+        text = "".join(self._pieces.pop(k) for k in range(count))
+        is_repeated, self._last = (number, text) == self._last, (number, text)
+        return None if is_repeated else text
 
 
 # ---- Channel reports

@@ -59,6 +59,7 @@ class MissionFacts(NamedTuple):
 
     in_guided_mode: bool = True  # the autopilot obeys our setpoints
     in_land_mode: bool = False  # it lands by itself
+    in_failsafe: bool = False  # it reports that a failsafe of its own acts
     armed: bool = True
     is_landed: bool = False
     is_airborne: bool = True  # neither this nor is_landed: the autopilot does not report it
@@ -138,6 +139,15 @@ PHASES_BEFORE_RETURN = _phases(_P.TAKEOFF, _P.GATHER, _P.FLOCK, _P.GOTO)
 # The first row that holds wins, so the order is the priority; each row can be fired alone in a test
 # and read by a safety officer.
 MISSION_TABLE: tuple[Row, ...] = (
+    # Measured with ArduCopter 4.6.0-dev: 8 s after GPS was lost it lands by itself, before row 6b.
+    # To the other drones it is not one that a pilot has and may fly anywhere.
+    Row(
+        "1b",
+        FLYING_PHASES,
+        "the autopilot lands by a failsafe of its own",
+        lambda f, s: f.armed and f.in_land_mode and f.in_failsafe,
+        _P.LAND,
+    ),
     Row(
         "1",
         FLYING_PHASES,

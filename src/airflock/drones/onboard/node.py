@@ -5,13 +5,20 @@ give the same outputs to the bit, so that a log can be flown again.
 """
 
 import re
+from collections import deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from airflock.core import State
 from airflock.drones.mavlink import orders
-from airflock.drones.mavlink.autopilots import TAKE_OFF_COMMAND, AutopilotCommands, ParameterCheck
-from airflock.drones.mavlink.messages import STATUS_MESSAGE, DroneStatus, parse_status_payload, status_message
+from airflock.drones.mavlink.autopilots import TAKE_OFF_COMMAND, AutopilotCommands
+from airflock.drones.mavlink.messages import (
+    STATUS_MESSAGE,
+    DroneStatus,
+    parse_status_payload,
+    status_message,
+    text_messages,
+)
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketReceiver, PacketSigner
 from airflock.drones.onboard.card import FlightCard
@@ -28,10 +35,10 @@ UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, t
 
 
 def requests(
-    commands: AutopilotCommands, link: AutopilotLink, checks: Iterable[ParameterCheck], streams: Iterable[int]
+    commands: AutopilotCommands, link: AutopilotLink, parameters: Iterable[str], streams: Iterable[int]
 ) -> list[bytes]:
-    """Return requests to the autopilot for parameters that are not known, the origin, and these streams."""
-    messages = [commands.request_parameter(check.name) for check in checks if check.name not in link.parameters]
+    """Return requests to the autopilot for these parameters, for the origin if it is not known, and these streams."""
+    messages = [commands.request_parameter(name) for name in parameters]
     if link.origin is None:
         messages.append(commands.request_message(ORIGIN_MESSAGE))
     return messages + commands.request_streams(streams)
@@ -41,7 +48,7 @@ def own_status(
     card: FlightCard, link: AutopilotLink, own: State, time: int, phase: MissionPhase, *, peers: int
 ) -> DroneStatus:
     """Return the own status at a time (µs of Unix time), with the number of peers that are heard."""
-    offset = link.clock_offset()
+    offset = link.unexplained_offset
     return DroneStatus(
         time=time,
         position=own[:3],
@@ -62,6 +69,7 @@ def own_status(
 QUANTITY = re.compile(r"[-+]?\d+(\.\d+)? (?=Hz|m|km|s|%)")
 RETRY_PERIOD = 1.0  # s between two tries of a command
 KILL_SECONDS = 3.0  # s at least for which a kill is repeated to an autopilot that is armed
+MAX_UNSENT_LINES = 64  # lines for a person that wait for the radio
 PREFLIGHT_PHASES = frozenset({MissionPhase.BOOT, MissionPhase.READY, MissionPhase.CLEARED})
 
 
@@ -74,11 +82,15 @@ class NodeMemory(NamedTuple):
 
 
 class NodeOutput(NamedTuple):
-    """Output of one tick: bytes for the autopilot, datagrams for each radio, lines for a person to read."""
+    """Output of one tick: bytes for the autopilot, datagrams for each radio, lines for a person to read.
+
+    texts : datagrams for the first radio that bring the lines to whoever watches; drones ignore them
+    """
 
     autopilot: list[bytes]
     radios: tuple[list[bytes], ...]
     notes: list[str]
+    texts: list[bytes]
 
 
 # Bytes and a clock in, bytes out: lock-step fleets, fuzzing and replay of a log run the code that
@@ -127,6 +139,8 @@ class Node:
         self._standing_velocity: Velocity | None = None  # what keeps it where it stopped for somebody who is not heard
         self._reported_missing: tuple[str, ...] = ()
         self._notes: list[str] = []
+        self._unsent_lines: deque[tuple[int, str]] = deque(maxlen=MAX_UNSENT_LINES)
+        self._line_number = 0
         self._phase_velocity = PhaseVelocity(card, self.pilot, now, self._notes)
 
     # ------------------------------------------------------------------------------------------------------ in
@@ -204,7 +218,9 @@ class Node:
             self._restarts, self._request_at = self.autopilot_link.restarts, -1e9
             self._notes.append("the autopilot has rebooted, or its streams ended: all is requested once more")
         self._has_flown |= self.phase in FLYING_PHASES and self.autopilot_link.is_landed is False
-        out = NodeOutput([], tuple([] for _ in self._radio_periods), [])
+        out = NodeOutput([], tuple([] for _ in self._radio_periods), [], [])
+        self._notes += self.autopilot_link.lines
+        self.autopilot_link.lines.clear()
         known = self._mission_facts(now, overload=late or self._phase_velocity.failed)
         self._overload_count += known.is_overloaded
         self._phase_velocity.failed = False
@@ -231,6 +247,11 @@ class Node:
         self._steer(now, known, out)
         self._speak(now, known, out)
         out.notes.extend(self._notes)
+        for note in self._notes:
+            self._line_number = self._line_number % 0xFFFF + 1
+            # The phase is in each status; the line adds why. It is sent twice: a radio loses packets.
+            why = note.partition(": ")[2] if " → " in note else note
+            self._unsent_lines.extend(2 * [(self._line_number, why)])
         self._notes.clear()
         return out
 
@@ -238,6 +259,11 @@ class Node:
         s, own = self.card.safety, self.autopilot_link.state
         if own is not None:
             self._standing_velocity = self.pilot.stay(self.card.law_state(own), now)
+        # After a step of the estimate both positions of the autopilot agree again, at a place that may
+        # be the wrong one (measured: 22 m off, 5 s after a disturbed GNSS): only a person can see it.
+        if self.phase in FLYING_PHASES and not self.operator.held and self.autopilot_link.is_position_doubtful(now):
+            self.operator.held = True
+            self._notes.append("the position jumped: holds until the operator resumes; compare its place with the map")
         order = self.operator.next_order()
         if self.phase in PREFLIGHT_PHASES and self.operator.missed(self.utc(now), self.card.turn(self.member)):
             self._notes.append("not started: something was missing when its turn came; order the start once more")
@@ -286,6 +312,7 @@ class Node:
         if to == MissionPhase.ARMING:
             assert self.autopilot_link.state is not None
             self.operator.held = self.operator.resume_ordered = False
+            self.autopilot_link.reported_lines.clear()
             self.home = (self.autopilot_link.state.x, self.autopilot_link.state.y, self.card.layer(self.member))
         if was not in PREFLIGHT_PHASES and to == MissionPhase.READY:
             self.operator.start_at = None
@@ -389,8 +416,8 @@ class Node:
         # In flight, too: there a stream that ends, or that somebody slows down, is needed most.
         if now - self._request_at >= RETRY_PERIOD - TIME_TOLERANCE and self.phase != MissionPhase.FAULT:
             streams = dict.fromkeys((*self._overdue, *(POSITION_MESSAGES if mission_facts.bad_streams else ())))
-            checks = self.card.autopilot.parameter_checks if self.phase in PREFLIGHT_PHASES else ()
-            messages = requests(self._speaker, self.autopilot_link, checks, streams)
+            parameters = self.autopilot_link.unknown_parameters() if self.phase in PREFLIGHT_PHASES else []
+            messages = requests(self._speaker, self.autopilot_link, parameters, streams)
             self._request_at = now if messages else self._request_at
             out.autopilot.extend(messages)
         due = [k for k, at in enumerate(self._next_status) if now >= at - TIME_TOLERANCE]
@@ -400,6 +427,9 @@ class Node:
             for k in due:
                 self._next_status[k] = max(self._next_status[k] + self._radio_periods[k], now)
                 out.radios[k].append(datagram)
+        if 0 in due and self._unsent_lines:
+            number, line = self._unsent_lines.popleft()
+            out.texts.extend(self._signer(piece, self.utc(now)) for piece in text_messages(line, number))
 
     def status_datagrams(self, now: float) -> list[bytes]:
         """Return the own status as a signed datagram; nothing while the own position is unknown."""

@@ -489,6 +489,8 @@ def tick_task(
         for port, datagrams in zip(ports[1:], out.radios, strict=True):
             for datagram in datagrams:
                 port.write(datagram)
+        for datagram in out.texts:
+            ports[1].write(datagram)
         for note in out.notes:
             notify(note)
         if now >= save_at:

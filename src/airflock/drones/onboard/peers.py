@@ -8,13 +8,13 @@ from math import isfinite, sqrt
 from typing import Any
 
 from airflock.core import State
-from airflock.drones.mavlink.autopilots import ARMED_FLAG, STREAM_RATES, Autopilot
-from airflock.drones.mavlink.frames import FrameStream, MavlinkFrame
-from airflock.drones.mavlink.messages import DroneStatus
+from airflock.drones.mavlink.autopilots import ARMED_FLAG, COMMAND_TEXTS, NODE_COMPONENT, STREAM_RATES, Autopilot
+from airflock.drones.mavlink.frames import FrameStream, MavlinkFrame, common_dialect
+from airflock.drones.mavlink.messages import DroneStatus, TextPieces
 from airflock.drones.mavlink.orders import CALL_OFF_ORDERS, OperatorOrder, OrderKind, parse_order
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import AIRBORNE_PHASES, FLOCKING_PHASES, MissionPhase
-from airflock.support import FlightSite, LinkError, swap_enu_ned
+from airflock.support import FlightSite, LinkError, printable, swap_enu_ned
 
 # ---- Peers
 
@@ -105,6 +105,18 @@ class Peers:
     def flying(self) -> dict[int, Peer]:
         """Return the members that were in the air by their last status."""
         return {who: peer for who, peer in self.all.items() if peer.is_flying}
+
+    def confirm_clock(self, now: float) -> bool:
+        """Return True if the clocks of all members that are heard, one at least, agree with the own one."""
+        limit = self._card.safety.clock_error
+        heard = [peer for peer in self.all.values() if now - peer.heard_at <= HEARD_WITHIN]
+        # A radio on board takes next to no time, a simulated one the card's delay. A clock that is
+        # ahead by just that delay passes here, but not the others: it sends from their future.
+        return bool(heard or not self.all) and all(
+            len(peer.packet_ages) == AGE_COUNT
+            and any(abs(min(peer.packet_ages) - delay) <= limit for delay in (0.0, self._card.delay))
+            for peer in heard
+        )
 
     def is_own_clock_suspect(self) -> bool:
         """Return True if at least two members, and all that are known, seem to have a wrong clock: then it is ours."""
@@ -223,6 +235,12 @@ RATE_SPAN = 2.0  # s over which the rate of the own position is measured: about 
 # A stream at exactly the needed rate jitters: a fifth less is still accepted.
 RATE_SHARE = 0.8
 FIGURE_COUNT = 5  # arrivals that give the figure of a rate which is too low
+FAILSAFE_STATES = (5, 6)  # MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY
+BATTERY_BIT, PREARM_BIT = 1 << 25, 1 << 28  # of the sensors in SYS_STATUS; PX4 does not enable the latter
+UNKNOWN_VOLTAGE = 65535  # mV
+REPORTED_LINES = 20  # the last lines of an autopilot, which are not reported again
+WARNING = 4  # MAV_SEVERITY; lines of the autopilot that are less severe are for its maker
+ACCEPTED_RESULTS = (0, 5)  # MAV_RESULT: accepted, in progress
 
 
 class AutopilotLink:
@@ -236,6 +254,11 @@ class AutopilotLink:
     arrivals      : time at which each stream of STREAM_RATES was heard last, s, by number of its message
     restarts      : number of times that the autopilot seems to have rebooted on the ground
     refused       : number of frames with implausible content
+    in_failsafe   : it reports that a failsafe of its own acts
+    prearm_fails  : it reports that it would not arm
+    battery_warning : a line if it reports a bad battery (by voltage or capacity); else empty
+    lines         : its texts and refusals that nobody has read yet
+    explained_offset : offset (s) of its clock from ours, which other drones confirmed
     other_systems : system ids of other autopilots on this wire
     """
 
@@ -251,6 +274,11 @@ class AutopilotLink:
         self.is_landed: bool | None = None
         self.fix_type, self.horizontal_accuracy = 0, 1e9
         self.battery: float | None = None
+        self.in_failsafe = self.prearm_fails = False
+        self.battery_warning = ""
+        self.lines: list[str] = []
+        self.reported_lines: deque[str] = deque(maxlen=REPORTED_LINES)
+        self._pieces, self.explained_offset = TextPieces(), 0.0
         self.jumped_at = -1e9
         self.parameters: dict[str, float] = {}
         self.clock_offsets: list[float] = []
@@ -323,19 +351,46 @@ class AutopilotLink:
         self._boot_ms, self.state, self.state_at = boot_ms, None, -1e9
         self.global_state, self.global_at, self.origin, self.is_landed = None, -1e9, None, None
         self.fix_type, self.horizontal_accuracy, self.battery = 0, 1e9, None
-        self.parameters, self.clock_offsets, self.arrivals = {}, [], {}
+        self.parameters, self.clock_offsets, self.explained_offset, self.arrivals = {}, [], 0.0, {}
         self._state_times.clear()
 
     def _heartbeat(self, v: dict[str, Any], now: float, utc: int) -> bool:
         self.kind, self.mode, self.armed = v["autopilot"], v["custom_mode"], bool(v["base_mode"] & ARMED_FLAG)
-        self.heartbeat_at = now
+        self.heartbeat_at, self.in_failsafe = now, v["system_status"] in FAILSAFE_STATES
         return True
 
     def _sys_status(self, v: dict[str, Any], now: float, utc: int) -> bool:
         if v["battery_remaining"] > 100:
             return False
         self.battery = float(v["battery_remaining"]) if v["battery_remaining"] >= 0 else None
+        # Per cent are counted from a capacity that somebody typed: the bit also knows the voltage.
+        bad = v["onboard_control_sensors_enabled"] & ~v["onboard_control_sensors_health"]
+        volts = f" at {v['voltage_battery'] * 1e-3:.1f} V" if v["voltage_battery"] != UNKNOWN_VOLTAGE else ""
+        warned, self.prearm_fails = self.battery_warning, bool(bad & PREARM_BIT)
+        self.battery_warning = f"battery: the autopilot reports it low or bad{volts}" if bad & BATTERY_BIT else ""
+        if self.battery_warning and not warned and self.armed:
+            self.lines.append(self.battery_warning)
         return True
+
+    def _acknowledged(self, v: dict[str, Any], now: float, utc: int) -> bool:
+        ours = v["target_system"] in (0, self._member) and v["target_component"] in (0, NODE_COMPONENT)
+        if ours and v["command"] in COMMAND_TEXTS and v["result"] not in ACCEPTED_RESULTS:
+            known = common_dialect().enums["MAV_RESULT"].get(v["result"])
+            result = known.name.removeprefix("MAV_RESULT_").lower().replace("_", " ") if known else v["result"]
+            self.report(f"the autopilot refuses {COMMAND_TEXTS[v['command']]}: {result}")
+        return True
+
+    def _text(self, v: dict[str, Any], now: float, utc: int) -> bool:
+        text = self._pieces(v)
+        if text and v["severity"] <= WARNING:
+            self.report(f"autopilot: {printable(text)}")
+        return True
+
+    def report(self, line: str) -> None:
+        """Keep a line for a person, once: an autopilot repeats its reasons every second."""
+        if line not in self.reported_lines:
+            self.reported_lines.append(line)
+            self.lines.append(line)
 
     def _system_time(self, v: dict[str, Any], now: float, utc: int) -> bool:
         self._boots(v["time_boot_ms"])
@@ -393,6 +448,9 @@ class AutopilotLink:
         if not isfinite(value):
             return False
         self.parameters[v["param_id"]] = value
+        meaning = self._autopilot.battery_parameters.get(v["param_id"])
+        if meaning and not self.armed:
+            self.report(f"{v['param_id']} = {value:g}: {meaning}")
         return True
 
     def _moved(self, state: State, now: float) -> None:
@@ -414,7 +472,7 @@ class AutopilotLink:
 
     _HANDLERS = {
         0: _heartbeat, 1: _sys_status, 2: _system_time, 24: _gps, 32: _local, 33: _global, 49: _origin, 245: _landed,
-        22: _parameter,
+        22: _parameter, 77: _acknowledged, 253: _text,
     }  # fmt: skip
 
     def position_disagreement(self, now: float) -> float:
@@ -422,6 +480,22 @@ class AutopilotLink:
         if self.state is None or self.global_state is None or now - self.global_at > 0.5 or now - self.state_at > 0.5:
             return 0.0
         return max(abs(a - b) for a, b in zip(self.state[:3], self.global_state[:3], strict=True))
+
+    def unknown_parameters(self) -> list[str]:
+        """Return the names of the needed parameters that are not known."""
+        unknown = [check for check in self._autopilot.parameter_checks if check.value(self.parameters) is None]
+        names = [name for check in unknown for name in check.names]
+        return names + [name for name in self._autopilot.battery_parameters if name not in self.parameters]
+
+    def is_position_doubtful(self, now: float) -> bool:
+        """Return True if the own position has just jumped, or the two positions of the autopilot differ."""
+        return now - self.jumped_at < 1.0 or self.position_disagreement(now) > self._max_jump
+
+    @property
+    def unexplained_offset(self) -> float | None:
+        """Return the part (s) of the clock's offset that nothing explains; None: unknown."""
+        offset = self.clock_offset()
+        return None if offset is None else offset - self.explained_offset
 
     def clock_offset(self) -> float | None:
         """Return how far (s) the autopilot's clock is ahead of ours, by the least delayed sample; None: unknown."""
