@@ -244,6 +244,14 @@ def test_a_landing_by_a_failsafe_of_the_autopilot_is_no_pilot():
         assert node.phase == phase and ("by a failsafe of its own" in last) == failsafe, last
 
 
+def test_a_jump_behind_a_silence_is_a_jump():
+    for seconds, step, jumps in ((0.2, 6.0, True), (3.0, 22.0, True), (3.0, 4.0, False), (12.0, 40.0, False)):
+        node, vehicle = node_with_vehicle()
+        live(node, vehicle, 0.0, 2.0)
+        node.autopilot_link._moved(State(step, 0.0, 0.0, 0.0, 0.0, 0.0), 1.8 + seconds)
+        assert node.autopilot_link.is_position_doubtful(1.8 + seconds) == jumps, (seconds, step)
+
+
 def test_after_a_jump_a_drone_holds_until_the_operator_resumes_though_both_positions_agree_again():
     f = fleet(scenario(3, duration=300.0))
     f.advance(12.0)

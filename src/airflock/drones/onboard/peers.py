@@ -228,6 +228,7 @@ AUTOPILOT_COMPONENT = 1  # component id
 MAX_DISTANCE = 1e5  # m from the site; and m/s: nothing that flies here is there
 INVALID_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: ground stations and companions
 CLOCK_SAMPLES = 10  # samples of the autopilot's clock that are kept
+JUMP_SPAN = 10.0  # s; after a longer silence a drone may be anywhere, and no step is a jump
 REBOOT_MS = 2000  # ms; messages that overtake each other differ by less
 MOVING_SPEED = 0.3  # m/s; who flies faster than this cannot stay at the same place
 STREAM_SILENCE = 2.0  # s; a stream that is older is requested once more: the slowest has 1 Hz
@@ -462,7 +463,7 @@ class AutopilotLink:
         # A frozen estimate keeps sending: without this it would look fresh for ever.
         if last is not None and last[:3] == state[:3] and max(map(abs, state[3:])) > MOVING_SPEED:
             return
-        if last is not None and passed < 1.0:
+        if last is not None and passed < JUMP_SPAN:
             step = max(abs(a - b) for a, b in zip(last[:3], state[:3], strict=True))
             speed = max(max(map(abs, last[3:])), max(map(abs, state[3:])))
             # A jump that no velocity explains means that the navigation has reset.
