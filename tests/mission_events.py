@@ -33,6 +33,7 @@ SWITCHES = {
     "battery critical": {"battery": 5.0}, "battery full": {"battery": 90.0},
     "neighbour is lost": {"heard": False}, "neighbour is heard": {"heard": True},
     "neighbour flies near": {"near": True}, "neighbour is far": {"near": False},
+    "lands by a failsafe": {"land": True, "failsafe": True}, "failsafe is over": {"failsafe": False},
 }  # fmt: skip
 ACTIONS = (
     "pilot arms",
@@ -40,6 +41,7 @@ ACTIONS = (
     "pilot and operator resume",
     "reboots",
     "late tick",
+    "jumps aside",
     "jumps out",
     "jumps home",
 )
@@ -69,7 +71,8 @@ class Flight:
         self.resumed = False  # by an order since it stood last
         self.ground_ticks = 0  # in a phase that flies
         self.pilot, self.land, self.lift, self.weak, self.position, self.fix = True, False, 0.0, False, True, 3
-        self.silent = self.blind = self.near = False
+        self.silent = self.blind = self.near = self.failsafe = False
+        self.jumped = False  # in flight, and nobody has released it since
         self.clock, self.battery, self.heard, self.log = 0.0, 90.0, True, []
         link = self.node.autopilot_link
         link.origin, link.kind = (0.0, 0.0, 0.0), self.card.autopilot.number
@@ -90,6 +93,7 @@ class Flight:
             point = (round(goal.latitude * 1e7), round(goal.longitude * 1e7), round(goal.altitude * 1e3))
             node.operator._obey(OperatorOrder(event, 0, self.card.mission, now, now, point), now)
             self.resumed |= event == OrderKind.RESUME
+            self.jumped &= event in (OrderKind.HOLD, OrderKind.GO, OrderKind.START)
             if event == OrderKind.START:
                 self.start_at = self.now
             elif event in CALL_OFF_ORDERS and node.phase in (P.BOOT, P.READY, P.CLEARED, P.ARMING):
@@ -109,16 +113,20 @@ class Flight:
             node.autopilot_link.origin = None
         elif event == "late tick":
             self.now += 1.4
-        elif event in ("jumps out", "jumps home"):
-            self.x = 500.0 if event == "jumps out" else 0.0
+        elif event.startswith("jumps"):
+            x = {"jumps out": 500.0, "jumps aside": 20.0}.get(event, 0.0)
+            self.jumped |= x != self.x and self.position and node.phase in FLYING_PHASES
+            self.x = x
 
     def step(self):
         """Let both live for a tick."""
         self.now += DT
         self._move()
         self._report()
-        was, stood = self.node.phase, self.z == 0.0
+        was, stood, lands = self.node.phase, self.z == 0.0, self.land and self.armed
         out = self.node.tick(self.now)
+        if was in FLYING_PHASES and lands:  # before anything that the node commands: the pilot's or the autopilot's
+            assert self.node.phase == (P.LAND if self.failsafe else P.MANUAL), (self.node.phase, self.log)
         self.log += [(round(self.now, 1), note) for note in out.notes if "→" in note]
         for name, *values in out.autopilot:
             self._check_command(name, values)
@@ -156,7 +164,7 @@ class Flight:
         link.arrivals |= {number: now for number in STREAM_RATES if number not in silent}
         link.is_landed = link.is_landed if self.blind else self.z == 0.0
         link.fix_type, link.horizontal_accuracy, link.battery = self.fix, 1.0, self.battery
-        link.clock_offsets = [self.clock]
+        link.clock_offsets, link.in_failsafe = [self.clock], self.failsafe
         if self.position:
             link._moved(State(self.x, 0.0, self.z, 0.0, 0.0, self.speed_up), now)
         peer = self.node.peers.all[2]
@@ -209,6 +217,9 @@ class Flight:
         assert self.ground_ticks < 9, (phase, "on the ground", self.log)
         assert phase != P.HOLD or was != P.MANUAL or self.resumed, ("resumed by an order of before", self.log)
         self.resumed &= self.z > 0.0
+        if was == P.HOLD and self.jumped:
+            assert phase not in (P.GATHER, P.FLOCK, P.GOTO, P.TAKEOFF), (phase, "after a jump", self.log)
+        self.jumped &= phase in FLYING_PHASES
         if phase in FLYING_PHASES:
             assert self.node.autopilot_link.mode == self.card.autopilot.ours, (phase, "of a pilot", self.log)
         if self.now - self.stood_at > 1.0 and self.armed and seen and phase != P.FAULT:

@@ -37,6 +37,7 @@ EVENTS = {
     "it is disarmed on the ground": STANDS | {"has_flown": True},
     "the pilot takes over": {"in_guided_mode": False, "in_land_mode": False},
     "the pilot lets it land": {"in_guided_mode": False, "in_land_mode": True},
+    "a failsafe lets it land": {"in_guided_mode": False, "in_land_mode": True, "in_failsafe": True},
     "resume, in our mode": {"resume_ordered": True, "in_guided_mode": True, "setpoints_for": 2.0},
     "resume, in our mode, on the ground": SPINS
     | {"resume_ordered": True, "in_guided_mode": True, "setpoints_for": 2.0},
