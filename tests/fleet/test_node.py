@@ -143,7 +143,7 @@ def arducopter(members=(1,), **more):
     flown = parse_card({**made, "hash": card_hash(made)})
     node = Node(flown, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
     vehicle = SoftwareVehicle(
-        "ardupilot", 1, flown.site, (0.0, 0.0, 0.0), found.vehicle, found.body, started=START_TIME
+        "ardupilot", 1, flown.site, (0.0, 0.0, 0.0), found.body.rule, found.body.numbers, started=START_TIME
     )
     return node, vehicle
 

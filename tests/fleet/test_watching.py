@@ -115,7 +115,9 @@ def test_why_a_drone_does_something_stands_on_the_page_once_in_its_own_words():
 def test_who_sends_false_states_leaves_lines_as_they_are():
     f, _ = watched()
     faults = [InjectedFault(kind, (1,), 0.0, 9.0, 30.0) for kind in ("rogue", "impostor")]
-    channel = RadioChannel(f.scenario.transceiver, f.scenario.radio, f.card.members, 0, 0.1, faults, site=f.card.site)
+    channel = RadioChannel(
+        f.scenario.radio.rule, f.scenario.radio.numbers, f.card.members, 0, 0.1, faults, site=f.card.site
+    )
     line = PacketSigner(SOFTWARE_KEY, 1)(text_messages("no valid position", 1)[0], START_TIME)
     channel.send(0.0, 0, line)
     at = [s[:3] for s in START]
