@@ -580,7 +580,7 @@ def test_a_card_of_anything_is_refused_or_sound(data):
     try:
         parse_card({**made, "hash": card_hash(made)})
     except CardError as fault:
-        assert fault.faults
+        assert fault.errors
 
 
 class Watched(LoggingNode):
