@@ -38,7 +38,7 @@ from airflock.support import LinkError, printable
 
 # ---- Telemetry broadcast
 
-DEFAULT_WATCH_ADDRESS = ("127.0.0.1", 14600)  # where who watches hears a fleet in software
+DEFAULT_WATCH_ADDRESS: tuple[str, int] = ("127.0.0.1", 14600)  # where who watches hears a fleet in software
 REPORT_PERIOD = 0.5  # s between two reports
 NEIGHBOUR_WITHIN = 1.0  # s; a neighbour whose last packet arrived longer ago is not heard
 NEVER_HEARD = -1e9
