@@ -89,7 +89,7 @@ def test_a_kill_is_repeated_until_the_autopilot_follows_and_no_longer():
     found.advance(2.0)
     assert not vehicle.armed
     found.advance(2.0 * KILL_SECONDS)
-    vehicle.armed = True  # somebody else has another flight in mind
+    vehicle.armed, vehicle.mode = True, PILOT_MODE  # it fell; somebody else has another flight in mind
     found.advance(5.0)
     assert vehicle.armed
 

@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from airflock.drones.onboard.node_program import UdpAddresses, UdpPort  # noqa: E402
 from airflock.fleets import compare  # noqa: E402
+from airflock.fleets.drone_faults import InjectedFault  # noqa: E402
 from airflock.fleets.realtime import (  # noqa: E402
     LOCAL_HOST,
     FleetPorts,
@@ -45,7 +46,9 @@ async def flown(kind, python, patience):
     card = compare.software_card(found, vehicle=kind, realtime=True)
     ports, now = FleetPorts.open(1, (LOCAL_HOST, join)), time.monotonic()
     epoch = time.time_ns() // 1000 - round(now * 1e6)
-    plan = RealtimePlan(found, card, 0, None, (), ports, [now, now + LONGEST, 0.0], [0.0] * 4, epoch)
+    # MAVSDK requests no streams, and ArduPilot sends none by itself: a station beside it requests them.
+    station = (InjectedFault("streams", amount=10.0),) if kind == "ardupilot" else ()
+    plan = RealtimePlan(found, card, 0, None, station, ports, [now, now + LONGEST, 0.0], [0.0] * 4, epoch)
     vehicle = asyncio.create_task(run_in_event_loop(vehicle_task(plan, 0)))
     try:
         client = await asyncio.create_subprocess_exec(

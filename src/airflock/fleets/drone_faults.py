@@ -33,10 +33,21 @@ INJECTED_KINDS = {
     "battery": "the battery is at `amount` %",
     "pilot": "the pilot takes over at the beginning",
     "clock": f"the node's clock is ahead by `amount` s {WHOLE_FLIGHT_TEXT}",
+    "reboot": "the autopilot reboots at the beginning and forgets all streams; in the air its motors stop",
+    "streams": "a ground station sets all streams of the autopilot to a rate (1/s), and again every 15 s",
+    "uplink": "nothing that the node sends reaches its autopilot",
+    "throttle": "the throttle stick is not neutral, and ArduPilot refuses to arm",
+    "no_gnss": "the GNSS receiver has no fix: the position drifts, and ArduPilot lands after 8 s",
+    "voltage": "the battery has a voltage (V) of its own, whatever charge is counted",
+    "capacity": f"the battery holds a charge (mAh) {WHOLE_FLIGHT_TEXT}; others never get empty",
+    "autopilot_clock": f"the autopilot's clock is ahead (s) {WHOLE_FLIGHT_TEXT}",
+    "clock_drift": f"the autopilot's clock gains (µs each second) {WHOLE_FLIGHT_TEXT}",
 }
+WHOLE_FLIGHT_KINDS = frozenset({"clock", "capacity", "autopilot_clock", "clock_drift"})
 AMOUNT_RANGES = {
     "loss": (0.0, 1.0), "duplicate": (0.0, 1.0), "corrupt": (0.0, 1.0), "jitter": (0.0, 30.0), "battery": (0.0, 100.0),
-    "clock": (-3600.0, 3600.0), "rogue": (-1e4, 1e4), "impostor": (-1e4, 1e4),
+    "clock": (-3600.0, 3600.0), "rogue": (-1e4, 1e4), "impostor": (-1e4, 1e4), "streams": (0.0, 50.0),
+    "voltage": (0.0, 100.0), "capacity": (1.0, 1e6), "autopilot_clock": (-3600.0, 3600.0), "clock_drift": (-1e3, 1e3),
 }  # fmt: skip
 
 
@@ -65,9 +76,9 @@ class InjectedFault:
         return not self.who or system in self.who
 
 
-def initial_clock_offset(faults: Sequence[InjectedFault], system: int) -> int:
-    """Return how far the clock of a node is ahead from the start of the flight on, µs."""
-    return sum(round(fault.amount * 1e6) for fault in faults if fault.kind == "clock" and fault.affects(system))
+def whole_flight_amount(faults: Sequence[InjectedFault], kind: str, system: int) -> float:
+    """Return the sum of the amounts of one kind of fault of a drone, from the start of the flight on."""
+    return sum(fault.amount for fault in faults if fault.kind == kind and fault.affects(system))
 
 
 def read_injected_faults(path: Path, members: tuple[int, ...]) -> tuple[InjectedFault, ...]:
@@ -109,8 +120,8 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[InjectedFault], l
             wrong.append(f"amount is missing: {INJECTED_KINDS[kind]}; give it within [{low:g}, {high:g}]")
         elif not low <= numbers["amount"] <= high:
             wrong.append(f"amount = {numbers['amount']:g} lies outside [{low:g}, {high:g}]")
-    if kind == "clock" and not numbers.keys() <= {"amount"}:
-        wrong.append(f"a clock is wrong {WHOLE_FLIGHT_TEXT}: leave out begin and end")
+    if kind in WHOLE_FLIGHT_KINDS and not numbers.keys() <= {"amount"}:
+        wrong.append(f"{kind} holds {WHOLE_FLIGHT_TEXT}: leave out begin and end")
     if not wrong and numbers.get("begin", 0.0) >= numbers.get("end", 1e9):
         wrong.append("begin is not before end")
     return ([] if wrong else [InjectedFault(str(kind), tuple(who), **numbers)]), wrong

@@ -28,9 +28,9 @@ from airflock.drones import (
     write_key,
 )
 from airflock.fleets.card_document import agent_records, agent_sensors
-from airflock.fleets.drone_faults import DroneFaults, InjectedFault, initial_clock_offset
+from airflock.fleets.drone_faults import DroneFaults, InjectedFault, whole_flight_amount
 from airflock.fleets.radio_channel import SOFTWARE_KEY, FaultyNode, RadioChannel
-from airflock.fleets.vehicle import GUIDED, VEHICLE_FAULTS, SoftwareVehicle
+from airflock.fleets.vehicle import GUIDED, MESSAGE_RATES, SoftwareVehicle
 from airflock.scenarios import Scenario
 from airflock.support import CardError, Geodetic
 
@@ -118,8 +118,9 @@ ACCEPTED_BEFORE_START = 60_000_000
 
 
 def make_vehicle(
-    scenario: Scenario, card: FlightCard, index: int, body: Any, noise: MotionNoise, started: int
-) -> SoftwareVehicle:
+    scenario: Scenario, card: FlightCard, index: int, body: Any, noise: MotionNoise, started: int,
+    faults: Sequence[InjectedFault],
+) -> SoftwareVehicle:  # fmt: skip
     """Make a vehicle on the ground; the places form a square grid 4 m apart.
 
     index   : among the members
@@ -131,7 +132,7 @@ def make_vehicle(
     noisy = "noise" in number_names(body) and body.noise > 0.0
     draw = partial(noise, drone=index) if noisy else lambda step: (0.0, 0.0, 0.0)
     vehicle = SoftwareVehicle(
-        card.autopilot.name, card.members[index], card.site, at, scenario.body.rule, body, draw, started
+        card.autopilot.name, card.members[index], card.site, at, scenario.body.rule, body, draw, started, faults
     )
     vehicle.place = index
     return vehicle
@@ -167,6 +168,8 @@ def put_in_air(vehicle: SoftwareVehicle, card: FlightCard, start: State) -> None
     """Put a vehicle in the air, where it obeys its node as if it had done so for long."""
     vehicle.state = start._replace(z=start.z + (card.height if card.flat else law_zero_height(card)))
     vehicle.armed, vehicle.mode, vehicle.setpoint_at, vehicle.stream_since = True, GUIDED, 0.0, -9.0
+    # The node has requested them long ago.
+    vehicle.rates |= MESSAGE_RATES | {"heartbeat": vehicle.rates["heartbeat"]}
 
 
 class OperatorStation:
@@ -227,11 +230,14 @@ class LockstepFleet:
         self._has_sensor_error = scenario.has_sensor_error
         self._noise = MotionNoise(seed, len(card.members), not card.flat)
         self.vehicles = [
-            make_vehicle(scenario, card, i, b, self._noise, START_TIME) for i, b in enumerate(self._bodies)
+            make_vehicle(scenario, card, i, b, self._noise, START_TIME, faults) for i, b in enumerate(self._bodies)
         ]
+        for vehicle, s in zip(self.vehicles, start or (), strict=False):
+            put_in_air(vehicle, card, s)
         for vehicle in self.vehicles:
             vehicle.faults = drone_faults or None
-            vehicle.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._steps_per_tick * self._dt))
+            if vehicle.rates["local"]:
+                vehicle.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._steps_per_tick * self._dt))
             vehicle.rates |= dict.fromkeys(UNREAD_MESSAGES, 0.0)
         self.nodes = [
             Node(
@@ -239,22 +245,13 @@ class LockstepFleet:
                 who,
                 SOFTWARE_KEY,
                 now=0.0,
-                utc=START_TIME + initial_clock_offset(self.faults, who),
+                utc=START_TIME + round(1e6 * whole_flight_amount(self.faults, "clock", who)),
                 since=START_TIME - ACCEPTED_BEFORE_START,
             )
             for who in card.members
         ]
         self._faulty_nodes = [
             FaultyNode(partial(self.nodes.__getitem__, i), drone_faults, i, card.site) for i in range(len(self.nodes))
-        ]
-        self._faulty_vehicles = [
-            (vehicle, own)
-            for vehicle in self.vehicles
-            if (
-                own := [
-                    fault for fault in self.faults if fault.kind in VEHICLE_FAULTS and fault.affects(vehicle.system)
-                ]
-            )
         ]
         reach = drone_faults.reach if drone_faults else None
         radio, period = (scenario.radio.rule, scenario.radio.numbers), card.safety.status_period
@@ -268,12 +265,11 @@ class LockstepFleet:
         ]
         self._station = OperatorStation(card, operator)
         if start is not None:
-            self._begin(start)
+            self._begin()
 
-    def _begin(self, start: Sequence[State]) -> None:
-        """Put all in the air, flocking, and let all hear the start states as in the simulator."""
-        for vehicle, node, s in zip(self.vehicles, self.nodes, start, strict=True):
-            put_in_air(vehicle, self.card, s)
+    def _begin(self) -> None:
+        """Let all flock, and hear the start states as in the simulator."""
+        for vehicle, node in zip(self.vehicles, self.nodes, strict=True):
             node.phase, node.home = MissionPhase.FLOCK, (*vehicle.home[:2], self.card.layer(node.member))
             node.autopilot(vehicle.origin_frame(), 0.0)
             node.autopilot(vehicle.due_telemetry(0.0), 0.0)
@@ -326,9 +322,8 @@ class LockstepFleet:
             self._exchange(now)
         if self.steps % self._steps_per_period == 0:
             self._keep()
-        for vehicle, faults in self._faulty_vehicles:
-            vehicle.apply_faults(faults, now, self._dt)
         for vehicle in self.vehicles:
+            vehicle.apply_faults(now, self._dt)
             vehicle.step(now, self._dt)
         self.steps += 1
 

@@ -36,7 +36,7 @@ from airflock.drones import (
     tick_task,
 )
 from airflock.fleets.card_document import agent_records
-from airflock.fleets.drone_faults import DroneFaults, InjectedFault, initial_clock_offset
+from airflock.fleets.drone_faults import DroneFaults, InjectedFault, whole_flight_amount
 from airflock.fleets.fleet_observer import TelemetryBroadcast
 from airflock.fleets.lockstep import (
     ACCEPTED_BEFORE_START,
@@ -50,7 +50,7 @@ from airflock.fleets.lockstep import (
     put_in_air,
 )
 from airflock.fleets.radio_channel import SOFTWARE_KEY, FaultyNode, RadioChannel
-from airflock.fleets.vehicle import MESSAGE_MAKERS
+from airflock.fleets.vehicle import MESSAGE_MAKERS, MESSAGE_RATES
 from airflock.scenarios import Scenario
 from airflock.support import LinkError, ScenarioError
 
@@ -172,7 +172,7 @@ def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResul
     member = card.members[i]
     dies = min([fault.begin for fault in plan.faults if fault.kind == "node" and fault.affects(member)], default=1e9)
     now = time.monotonic()
-    utc = plan.utc(now) + initial_clock_offset(plan.faults, member)
+    utc = plan.utc(now) + round(1e6 * whole_flight_amount(plan.faults, "clock", member))
     node = Node(card, member, SOFTWARE_KEY, now=now, utc=utc, since=utc - ACCEPTED_BEFORE_START)
     drone_faults = DroneFaults(plan.scenario, plan.seed, only=i)
     faulty_node = FaultyNode(lambda: node, drone_faults, i, card.site, lambda own: own - plan.clock[0])
@@ -212,11 +212,11 @@ class RealtimeVehicle:
         self.plan, self.place, self.rows, self.steps = plan, i, [], 0  # type: ignore[var-annotated]
         body = agent_records(scenario, len(card.members), plan.seed)[i][1]
         noise = MotionNoise(plan.seed, 1, not card.flat, first_drone=i)
-        self.vehicle = made = make_vehicle(scenario, card, i, body, noise, plan.utc(time.monotonic()))
+        self.vehicle = made = make_vehicle(scenario, card, i, body, noise, plan.utc(time.monotonic()), plan.faults)
         self._faults = DroneFaults(scenario, plan.seed, only=i)
         made.faults = self._faults or None
         self.notes: list[tuple[float, int, str]] = []
-        self._booted = time.monotonic() - HOVER_SECONDS
+        self._booted, self._zero = time.monotonic() - HOVER_SECONDS, 0.0
         self._sensor_state = SensorState(scenario.sensors.rule, scenario.sensors.numbers, plan.seed, i, flat=card.flat)
         self._steps_per_period = max(1, round(card.period / scenario.flight.dt))
         self._node_port, self._client_port = plan.ports.vehicles[i], plan.ports.clients[i]
@@ -232,13 +232,15 @@ class RealtimeVehicle:
     @property
     def period(self) -> float:
         """Return the time between two looks, s: the period of its most frequent message."""
-        return max(MIN_LOOK_PERIOD, 1.0 / max(self.vehicle.rates.values()))
+        # Also with no stream but a heartbeat it must hear what its node sends, and move.
+        return max(MIN_LOOK_PERIOD, 1.0 / max(MESSAGE_RATES["local"], *self.vehicle.rates.values()))
 
     def look(self) -> None:
         """Read what came, move up to now, and send what is due."""
         vehicle, plan, zero = self.vehicle, self.plan, self.plan.clock[0]  # once: the clock may be set meanwhile
         now = time.monotonic() - zero
-        vehicle.start_time, vehicle.booted_at = plan.utc(zero), self._booted - zero
+        if zero != self._zero:  # not at each look: a reboot in flight has a time of its own
+            self._zero, vehicle.start_time, vehicle.booted_at = zero, plan.utc(zero), self._booted - zero
         for data in self._node_port.read():
             self._send(vehicle.receive(data, now))
         for data, sender in self._client_port.read_from():
@@ -284,7 +286,7 @@ class RealtimeVehicle:
                         self.steps // self._steps_per_period, vehicle.state, plan.card.period
                     )
                 self.rows.append(ABSENT_VEHICLE_ROW if vehicle.off else tuple(vehicle.state))
-            vehicle.apply_faults(plan.faults, at, dt)
+            vehicle.apply_faults(at, dt)
             vehicle.step(at, dt)
             self.steps += 1
 
