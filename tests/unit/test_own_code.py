@@ -1,13 +1,20 @@
 """Files of the user's own run as the text that they hold now, whatever bytecode lies beside them."""
 
+import importlib
+import linecache
 import os
+import random
+import re
 import subprocess
 import sys
+from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import Flight
+from airflock import model
+from airflock.engine import Flight, driver_text
 from airflock.scenarios.named_code import import_user_file
 from airflock.studio.player import FlightRequest, Player
 from airflock.support.errors import RuleError, ScenarioError
@@ -159,3 +166,116 @@ def test_a_page_stops_the_flight_of_a_rule_that_raises_and_goes_on(raising, monk
     path, told = raising
     player = Player(FlightRequest("vasarhelyi_2018/4ms", {"agents": 3}, law=path))
     assert not player.fly(50) and player.failure_message == f"stopped: {told}"
+
+
+OWN = """
+from dataclasses import dataclass
+import airflock
+COMMAND = "velocity"
+{globals}
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    speed: float = airflock.quantity(4.0, "m/s", low=0.1, high=30.0, meaning="preferred speed")
+def preferred_speed(p):
+    return p.speed
+def inner(x):
+    return {inner} * x
+def outer(x):
+    return inner(x) + {outer}
+def decide(p):
+    return {decide} * outer(GAIN * p.speed), 0.0, 0.0
+"""
+SHORT = {"duration": 2.0, "agents": 2, "sensors.kind": "perfect", "start.kind": "ball", "start.radius": 9.0}
+
+
+def drawn_law(rng):
+    """Text of a law whose numbers stand in a global, in helpers, and in the rule; some are whole, as people write."""
+    names = dict(zip(("inner", "outer", "decide"), (round(rng.uniform(0.2, 2.0), 2) for _ in range(3)), strict=True))
+    return OWN.format(globals=f"GAIN = {rng.choice([rng.randint(1, 3), round(rng.uniform(0.2, 2.0), 2)])}", **names)
+
+
+def texts(scenario):
+    """Text of a scenario's driver, and that of the law as if nothing had ever been flown before in this process."""
+    rule = scenario.model.decide
+    fresh, name = {"__name__": rule.__module__}, f"<fresh {len(linecache.cache)}>"
+    source = rule.__globals__["SOURCE"]
+    linecache.cache[name] = len(source), None, source.splitlines(keepends=True), name
+    exec(compile(source, name, "exec"), fresh)
+    law = model(fresh, scenario.model.name)
+    return driver_text(scenario), driver_text(airflock.load("vasarhelyi_2018/4ms", SHORT, law=law))
+
+
+def test_a_law_whose_cells_are_run_again_compiles_as_it_is_now(seed):
+    """Each cell is a text of its own, as in a notebook: the rule stays, what it refers to is defined anew."""
+    rng, cells, book = random.Random(seed), [], {"__name__": "__main__"}
+
+    def run(source):
+        name = f"<cell {seed} {len(cells)}>"
+        cells.append(source)
+        linecache.cache[name] = len(source), None, source.splitlines(keepends=True), name
+        exec(compile(source, name, "exec"), book)
+
+    run(book.setdefault("SOURCE", drawn_law(rng)))
+    kept = airflock.load("vasarhelyi_2018/4ms", SHORT, law=model(book, "mine"))
+    for _ in range(50):
+        before = re.split(r"(?=^def )", book["SOURCE"], flags=re.M)
+        after = re.split(r"(?=^def )", drawn_law(rng), flags=re.M)
+        piece = rng.choice([0, 2, 3, 4])  # the numbers, a helper's helper, a helper, the rule
+        run(after[piece] if piece else next(line for line in after[0].splitlines() if line.startswith("GAIN")))
+        before[piece] = after[piece]
+        book["SOURCE"] = "".join(before)
+        now = airflock.load("vasarhelyi_2018/4ms", SHORT, law=model(book, "mine"))
+        assert len(set(texts(now))) == 1, cells[-1]
+        if piece == 4:
+            kept = now  # a scenario holds the rules themselves; what they refer to is looked up
+        assert len(set(texts(kept))) == 1, f"a scenario that was loaded before: {cells[-1]}"
+    speeds = [airflock.simulate(kept, 1, device=device).velocity[-1] for device in ("cpu", "python")]
+    assert np.allclose(*speeds, atol=1e-4), "compiled and plain Python fly one law"
+
+
+def test_a_module_that_is_reloaded_compiles_as_it_is_now(tmp_path, monkeypatch, seed):
+    rng, path = random.Random(seed), tmp_path / f"reloaded{seed}.py"
+    monkeypatch.syspath_prepend(tmp_path)
+    module = None
+    for _ in range(20):
+        source = drawn_law(rng)
+        path.write_text(source)
+        importlib.invalidate_caches()
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)
+        module = importlib.reload(module) if module else importlib.import_module(path.stem)
+        module.SOURCE = source
+        scenario = airflock.load("vasarhelyi_2018/4ms", SHORT, law=module)
+        assert len(set(texts(scenario))) == 1
+
+
+def test_a_rule_whose_file_was_changed_since_is_refused_and_not_half_of_each(tmp_path):
+    rng, path = random.Random(4), tmp_path / "mine.py"
+    for lines in ("", "# a line more\n", "'''several\nlines\nmore'''\n"):
+        path.write_text(drawn_law(rng))
+        scenario = airflock.load("vasarhelyi_2018/4ms", SHORT, law=path)
+        path.write_text(lines + drawn_law(rng))
+        with pytest.raises(RuleError, match=r"mine.py:\d+: rule \w+: the file has changed since it was imported"):
+            driver_text(scenario)
+        assert driver_text(airflock.load("vasarhelyi_2018/4ms", SHORT, law=path))
+
+
+def test_a_variable_of_the_function_around_a_rule_hides_a_global_of_its_name():
+    def made(GAIN):
+        def decide(p):
+            return GAIN * p.speed, 0.0, 0.0
+
+        return decide
+
+    for gain in (1.5, 2.5):
+        names = {"COMMAND": "velocity", "Parameters": OneSpeed, "decide": made(gain)}
+        assert f"real({gain}) * p.speed" in driver_text(airflock.load("vasarhelyi_2018/4ms", SHORT, law=names))
+
+
+GAIN = 7.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneSpeed(airflock.Parameters):
+    """One speed."""
+
+    speed: float = airflock.quantity(4.0, "m/s", low=0.1, high=30.0, meaning="preferred speed")

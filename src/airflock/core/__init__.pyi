@@ -30,8 +30,10 @@ from .fault import (
     fault as fault,
 )
 from .law import (
+    bound_values as bound_values,
     fields_read as fields_read,
     resolve_global as resolve_global,
+    text_state as text_state,
     tree_of as tree_of,
     walk_tree as walk_tree,
 )

@@ -2,12 +2,14 @@
 
 import ast
 import inspect
+import linecache
 import math
+import os
 import textwrap
 import types
-from collections.abc import Callable, Iterator
-from functools import cache, lru_cache
-from typing import Any
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from functools import lru_cache, wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from airflock.support import RuleError
 
@@ -48,10 +50,82 @@ KEEPING = {"min", "max", "abs"}  # integers of integers
 MAKING = {"int", "len"}
 
 
-@lru_cache(maxsize=4096)
+# ---- The user's own rules as they are now: cells are run again, files are reloaded.
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Rule = Callable[..., Any]
+
+
+def bound_values(rules: Iterable[Any]) -> dict[types.FunctionType, dict[str, Any]]:
+    """Return what free names mean now, for each of the user's own rules and of the functions that they call.
+
+    Numbers, texts and NamedTuple classes are values; functions are followed. Rules of the package have no entry.
+    """
+    found: dict[types.FunctionType, dict[str, Any]] = {}
+    left = [rule for rule in rules if isinstance(rule, types.FunctionType)]
+    while left:
+        rule = left.pop()
+        if rule in found or (rule.__module__ or "").startswith("airflock."):
+            continue
+        names = {name for code in _codes(rule.__code__) for name in (*code.co_names, *code.co_freevars)}
+        values = {name: resolve_global(name, rule) for name in sorted(names)}
+        found[rule] = {name: value for name, value in values.items() if isinstance(value, (int, float, str, type))}
+        left += [value for value in values.values() if isinstance(value, types.FunctionType)]
+    return found
+
+
+def text_state(rules: Iterable[Any]) -> Hashable:
+    """Return a key that is equal as long as the text of rules, and all that it refers to, is the same."""
+    # By repr: 1, 1.0 and True are equal, but compile to different text.
+    return tuple(
+        (rule.__code__, rule.__defaults__, tuple((k, v if isinstance(v, type) else repr(v)) for k, v in values.items()))
+        for rule, values in bound_values(rules).items()
+    )
+
+
+def _codes(code: types.CodeType) -> list[types.CodeType]:
+    """Return a code object and all that are nested in it, such as those of generator expressions."""
+    return [code, *(inner for item in code.co_consts if isinstance(item, types.CodeType) for inner in _codes(item))]
+
+
+def cached_by_text(work: Callable[Concatenate[Rule, P], T]) -> Callable[Concatenate[Rule, P], T]:
+    """Cache what follows from a rule until it or what it refers to changes: a cell run again, a file reloaded."""
+
+    @lru_cache(maxsize=4096)
+    def kept(state: Hashable, rule: Rule, /, *more: P.args, **named: P.kwargs) -> T:
+        return work(rule, *more, **named)
+
+    @wraps(work)
+    def current(rule: Rule, /, *more: P.args, **named: P.kwargs) -> T:
+        return kept(text_state([rule]), rule, *more, **named)  # type: ignore[arg-type]
+
+    return current
+
+
+@cached_by_text
 def _source(rule: Callable[..., Any]) -> str:
     """Text of a rule; finding its end in its file takes longer than all else that is done with it."""
-    return textwrap.dedent(inspect.getsource(rule))
+    text = textwrap.dedent(inspect.getsource(rule))
+    code = inspect.unwrap(rule).__code__
+    if bound_values([rule]) and os.path.isfile(code.co_filename) and not _is_code_of_file(code):
+        where = f"{code.co_filename}:{code.co_firstlineno}"
+        raise RuleError(f"{where}: rule {rule.__name__}: the file has changed since it was imported; load it again")
+    return text
+
+
+def _is_code_of_file(code: types.CodeType) -> bool:
+    """Return False if the file of a function was changed after its import: then its lines hold another text."""
+    try:
+        file = compile("".join(linecache.getlines(code.co_filename)), code.co_filename, "exec", dont_inherit=True)
+    except SyntaxError:
+        return False
+
+    def essence(each: types.CodeType) -> tuple[Any, ...]:
+        constants = [repr(each) for each in each.co_consts if not isinstance(each, types.CodeType)]
+        return each.co_firstlineno, each.co_code, each.co_names, constants
+
+    return any(essence(each) == essence(code) for each in _codes(file))
 
 
 def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
@@ -66,7 +140,7 @@ def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
     return node
 
 
-@cache
+@cached_by_text
 def integer_names(rule: Callable[..., Any]) -> frozenset[str]:
     """Names in a rule that hold integers: its variables, and integers of its module."""
     node = tree_of(rule)
@@ -108,7 +182,8 @@ def is_integer(node: ast.expr, integers: set[str] | frozenset[str], rule: Callab
         name = _called(node)
         if name in KEEPING:
             return all(is_integer(argument, integers, rule) for argument in node.args)
-        return name in MAKING or _gives_integer(resolve_function(name, rule))
+        called = resolve_function(name, rule)
+        return name in MAKING or (called is not None and _gives_integer(called))
     return False
 
 
@@ -161,7 +236,8 @@ def _called(node: ast.AST) -> str:
 def resolve_global(name: str, rule: Callable[..., Any]) -> Any:
     """Return the value of a free name of a rule; None if it has none."""
     closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
-    return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
+    # A variable of the function around it hides a global of its name.
+    return closure[name].cell_contents if name in closure else rule.__globals__.get(name)
 
 
 def resolve_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
@@ -170,17 +246,15 @@ def resolve_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] 
     return found if isinstance(found, types.FunctionType) and found is not rule else None
 
 
-@cache
-def _gives_integer(rule: Callable[..., Any] | None) -> bool:
+@cached_by_text
+def _gives_integer(rule: Callable[..., Any]) -> bool:
     """Return True if every value that a function returns is an integer."""
-    if rule is None:
-        return False
     node = tree_of(rule)
     returned = [item.value for item in walk_tree(node) if isinstance(item, ast.Return) and item.value is not None]
     return bool(returned) and all(is_integer(value, integer_names(rule), rule) for value in returned)
 
 
-@cache
+@cached_by_text
 def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
     """Fields that a rule may read of the record that it calls by this name; None where its text leaves it open."""
     nodes = walk_tree(tree_of(rule))
@@ -312,7 +386,7 @@ def _instead(module: Any, name: str) -> str:
     return f"; write {source}" if source else ""
 
 
-@lru_cache(maxsize=4096)
+@cached_by_text
 def _rule_errors(rule: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(rule_errors(rule))
 

@@ -1,6 +1,6 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate
@@ -18,6 +18,7 @@ from airflock.core import (
     argument_names,
     choices,
     forward,
+    text_state,
     vector_sizes,
 )
 from airflock.engine.text.probe import probe_body, probe_fault, probe_model, probe_radio, probe_sensor, probe_topology
@@ -106,6 +107,7 @@ class PlanProperties:
     laws      : laws of groups, beside `model`; the numbers of the first have the letter p1, and so on
     law       : which of all laws the stages are made for that ask one: 0 is `model`; None where there is no other
     grouped   : a rule asks for the groups of agents
+    own_text  : state of the text of rules that are no part of the package: no driver outlives a change of them
     """
 
     model: Model
@@ -152,6 +154,7 @@ class PlanProperties:
     law: int | None = None
     uses_groups: bool = False
     build: BuildOptions = BuildOptions()
+    own_text: Hashable = ()
 
 
 # The plan.
@@ -456,12 +459,21 @@ def plan_of(
     absence     : agents may be absent; where a fault takes agents out, or empty batteries do, they may in any case
     """
     check_precision(precision)
-    key = "plan", precision, record, metrics, grid, near, given_start, absence
+    own_text = _own_text(scenario, metrics)
+    key = "plan", precision, record, metrics, grid, near, given_start, absence, own_text
     if key not in scenario.engine_cache:
         build = _build(scenario, precision, record, grid, near, given_start, absence)
-        scenario.engine_cache[key] = _planned(scenario, metrics, build)
+        scenario.engine_cache[key] = replace(_planned(scenario, metrics, build), own_text=own_text)
     found: Plan = scenario.engine_cache[key]
     return found
+
+
+def _own_text(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> Hashable:
+    """State of the text of a scenario's rules that are the user's own: a notebook changes what they refer to."""
+    models = [model for law in scenario.laws for model in (law.model, law.model.added) if model is not None]
+    kinds = scenario.vehicle, scenario.sensor, scenario.transceiver, scenario.own_topology, *scenario.fault_kinds
+    measures = scenario.order_parameters if metrics is None else metrics
+    return text_state(rule for part in (*models, *kinds, *measures) if part for rule in vars(part).values())
 
 
 def _build(

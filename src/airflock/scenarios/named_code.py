@@ -7,6 +7,7 @@ imported only with consent: `trust=True`, `--trust`, or the law itself (`law=`, 
 import hashlib
 import inspect
 import json
+import linecache
 import os
 import sysconfig
 import traceback
@@ -14,10 +15,10 @@ from collections.abc import Callable, Mapping
 from importlib import import_module, util
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import ModuleType
 from typing import Any, TypeVar
 
-from airflock.core import Model, declarations, model
+from airflock.core import Model, bound_values, declarations, model
 from airflock.support import (
     ParameterError,
     RuleError,
@@ -101,6 +102,7 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     if spec is None or not isinstance(spec.loader, SourceFileLoader):
         raise ScenarioError([f"{where}: is not a Python file"])
     module = util.module_from_spec(spec)
+    linecache.cache.pop(str(path), None)  # rules are compiled from it; it sees no change that keeps size and time
     try:  # the text as it is now: bytecode kept beside it may be of an earlier text, or of a stranger's
         exec(spec.loader.source_to_code(path.read_bytes(), str(path)), vars(module))
     # A file may call sys.exit or be interrupted while it is imported; the command must still end
@@ -161,24 +163,13 @@ def user_error_line(error: Exception) -> str:
 
 
 def law_hash(law: Model) -> str:
-    """Return a hash of the text of a law's rules and of the functions of its own that they call."""
+    """Return a hash of the text of a law's rules, and of the functions and numbers that they refer to."""
     texts: dict[str, str] = {}
-    left = [value for value in (*vars(law).values(), *law.decide_rules) if isinstance(value, FunctionType)]
-    # Follow the calls inside the module: a changed helper changes the law, though the text of its
-    # rules stays the same. Functions of other modules are left out.
-    while left:
-        rule = left.pop()
-        if rule.__qualname__ in texts:
-            continue
+    for rule, values in bound_values((*vars(law).values(), *law.decide_rules)).items():
         try:
             texts[rule.__qualname__] = inspect.cleandoc(inspect.getsource(rule))
         except (OSError, TypeError):  # typed at a prompt: there is only its code
             texts[rule.__qualname__] = rule.__code__.co_code.hex()
-        inside = [cell.cell_contents for cell in rule.__closure__ or ()]
-        called = [rule.__globals__.get(name) for name in rule.__code__.co_names]
-        left += [
-            found
-            for found in (*inside, *called)
-            if isinstance(found, FunctionType) and found.__module__ == rule.__module__
-        ]
+        numbers = {name: repr(value) for name, value in values.items() if not isinstance(value, type)}
+        texts |= {f"{rule.__qualname__}.{name}": number for name, number in numbers.items()}
     return hashlib.sha256(json.dumps(sorted(texts.items())).encode()).hexdigest()[:16]

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from airflock.core import bound_values
 from airflock.engine import plan_of
 from airflock.recordings import load_recording, replay_recording
 from airflock.runs import (
@@ -298,18 +299,21 @@ def study_from_request(
     else:
         study = load_study(what, settings=settings, search=search_keys, tables=tables, limits=limits, trust=trust)
     if fitness is not None:
-        code = getattr(fitness, "__code__", None)
-        text = _text_of(code) if code is not None else ""
         name = getattr(fitness, "__name__", "fitness")
-        study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
+        study = replace(study, objectives=(Objective(name, own=fitness, text=_text_of(fitness)),))
     return study
 
 
-def _text_of(code: Any) -> str:
-    """Return a hash of the code of a function; it is equal in every process."""
-    # Nested code objects print their address: they would change the hash in every process.
-    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
-    return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
+def _text_of(fitness: Any) -> str:
+    """Return a hash of the code of a function and of what it refers to; it is equal in every process."""
+    text = b""
+    for function, values in bound_values([fitness]).items():
+        code = function.__code__
+        # Nested code objects print their address: they would change the hash in every process.
+        constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+        numbers = repr({k: v for k, v in values.items() if not isinstance(v, type)}) if values else ""
+        text += code.co_code + repr((code.co_names, constants)).encode() + numbers.encode()
+    return hashlib.sha256(text).hexdigest()[:12] if text else ""
 
 
 def check_sensitivity_method(sensitivity: str) -> None:

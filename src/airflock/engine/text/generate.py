@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from typing import Any
 
-from airflock.core import law, random as random_streams, tree_of, walk_tree
+from airflock.core import law, random as random_streams, text_state, tree_of, walk_tree
 from airflock.engine.text.copies import DependencyRecorder, TextCache
 from airflock.engine.text.rewrite import NO_CHOICES, RuleRewriter
 from airflock.support import to_identifier
@@ -120,7 +120,7 @@ class DriverSource:
     def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
         law.check_rule(rule)
         notes = DependencyRecorder(rule, self)
-        of = rule, name, *chosen.items(), self.decorator, self.law, self.allow_builtins, self._apart
+        of = rule, text_state([rule]), name, *chosen.items(), self.decorator, self.law, self.allow_builtins, self._apart
         text = COPIES.text(of, notes)
         if text is None:
             text = self._copied(rule, name, chosen, notes)
