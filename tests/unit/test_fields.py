@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon, box
 
 import airflock
 from airflock.recordings.flown_scenario import scenario_of_recording
@@ -99,6 +99,10 @@ WRONG = {
     "none": ([{"type": "Feature", "geometry": {"type": "Point", "coordinates": [1.0, 2.0]}}], "holds no polygon"),
     "two": ([polygon(SHELL[:2])], "a ring of 2 corners"),
     "metres": ([polygon([[5e5, 5e6], [5.1e5, 5e6], [5e5, 5.1e6]])], "is not a longitude and latitude in degrees"),
+    "small metres": ([polygon([[0, 0], [80, 0], [80, 60]])], "are its numbers metres instead of degrees?"),
+    "exchanged": ([polygon([[-36.8, 174.7], [-36.9, 174.7], [-36.8, 174.8]])], "are they exchanged? longitude comes"),
+    "unhashable": ([{"type": "Feature", "geometry": {"type": {"a": []}}}], "holds no polygon"),
+    "open": ([{"type": "LineString", "coordinates": SHELL}], "(LineString) is not closed: its ends lie 334 m apart"),
     "text": ([polygon([["a", "b"], *SHELL[1:]])], "is not a point [longitude, latitude]"),
     "height": ([polygon(SHELL, floor="low")], "the property floor = 'low' is not a height in m"),
     "flat": ([{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 5}}], "coordinates is not a list"),
@@ -119,7 +123,7 @@ def test_faults_of_a_file_come_together_and_name_what_they_are_of(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "said"), [
-    ("no.geojson", "no such file"), ("a.kmz", "unzip it first"), ("a.shp", "ends in none of .geojson, .json, .kml"),
+    ("no.geojson", "no such file"), ("a.kmz", "unzip it first"), ("a.shp", "ends in none of .geojson, .json, .kml, .plan"),
 ])  # fmt: skip
 def test_a_file_of_no_use_is_one_line(tmp_path, name, said):
     if name.startswith("a"):
@@ -299,3 +303,131 @@ def test_a_field_and_another_arena_are_not_given_together():
     """The circle was flown, and the field forgotten."""
     (line,) = faults_of(FIELDS / "field.kml", **{"world.arena": "circle"})
     assert "world.arena = 'circle': is given, and world.file as well" in line
+
+
+# --- One field in all the ways in which people write it, at a place drawn at random ---
+
+
+def ring_at(site, corners):
+    places = [site.to_geodetic(x, y, 0.0) for x, y in corners]
+    return [(place.longitude, place.latitude) for place in places]
+
+
+def closed(ring):
+    return [*ring, ring[0]]
+
+
+def as_multipolygon(site, corners, rng):
+    """Its other part lies apart, and is smaller."""
+    other = ring_at(site, [(0.3 * x + 900.0, 0.3 * y) for x, y in corners])
+    parts = [[closed(ring_at(site, corners))], [closed(other)]]
+    rng.shuffle(parts)
+    return ".geojson", json.dumps({"type": "MultiPolygon", "coordinates": parts})
+
+
+def as_plan(site, corners, rng):
+    """Latitude comes first."""
+    fences = [{"inclusion": True, "polygon": [(y, x) for x, y in ring_at(site, corners)], "version": 1}]
+    return ".plan", json.dumps({"fileType": "Plan", "geoFence": {"polygons": fences, "circles": [], "version": 2}})
+
+
+def as_kml(site, corners, rng):
+    text = " ".join(f"{x:.9f},{y:.9f},0" for x, y in closed(ring_at(site, corners)))
+    ring = f"<LinearRing><coordinates>{text}</coordinates></LinearRing>"
+    shape = rng.choice(
+        [f"<Polygon><outerBoundaryIs>{ring}</outerBoundaryIs></Polygon>", ring.replace("Ring", "String")]
+    )
+    return ".kml", f"<kml><Placemark><name>field</name>{shape.replace('LinearString', 'LineString')}</Placemark></kml>"
+
+
+def as_line(site, corners, rng):
+    return ".geojson", json.dumps({"type": "LineString", "coordinates": closed(ring_at(site, corners))})
+
+
+def as_turned(site, corners, rng):
+    """Longitudes from 0 to 360."""
+    ring = [(x % 360.0, y) for x, y in ring_at(site, corners)]
+    return ".json", json.dumps({"type": "Polygon", "coordinates": [closed(ring)]})
+
+
+def as_cut(site, corners, rng):
+    """In two at 180°, as RFC 7946 wants it."""
+    whole = Polygon([(x % 360.0, y) for x, y in ring_at(site, corners)])
+    west, east = whole.intersection(box(170.0, -90.0, 180.0, 90.0)), whole.intersection(box(180.0, -90.0, 190.0, 90.0))
+    rings = [[list(p) for p in west.exterior.coords], [[x - 360.0, y] for x, y in east.exterior.coords]]
+    return ".geojson", json.dumps({"type": "MultiPolygon", "coordinates": [[ring] for ring in rings if len(ring) > 2]})
+
+
+WAYS = (as_multipolygon, as_plan, as_kml, as_line, as_turned, as_cut)
+
+
+def drawn_field(rng, longitude=None):
+    """A site, and the corners (m) of a polygon about it, in a circle with random radii."""
+    site = FlightSite(rng.uniform(-70.0, 70.0), rng.uniform(-179.9, 179.9) if longitude is None else longitude, 0.0)
+    count = rng.randint(4, 12)
+    turns = [2.0 * math.pi * (k + rng.uniform(0.0, 0.6)) / count for k in range(count)]
+    return site, [(r * math.cos(a), r * math.sin(a)) for a in turns for r in [rng.uniform(60.0, 200.0)]]
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_a_field_is_the_same_in_whatever_way_it_is_written(tmp_path, seed, way):
+    rng = random.Random(f"{seed} {way.__name__}")
+    for _ in range(50):
+        # a third of them, and all that are cut, lie across 180 degrees
+        across = way is as_cut or rng.random() < 0.3
+        site, corners = drawn_field(rng, rng.choice([-1, 1]) * (180.0 - rng.uniform(0.0, 3e-4)) if across else None)
+        suffix, text = way(site, corners, rng)
+        path = tmp_path / f"field{suffix}"
+        path.write_text(text)
+        found = load_field(path)
+        assert abs(found.origin[1]) <= 180.0
+        about = site.local(*found.origin, 0.0)
+        got = Polygon([(x + about[0], y + about[1]) for x, y in found.keys["corners"]])
+        assert got.symmetric_difference(Polygon(corners)).area < 0.001 * got.area, (site.origin, text)
+        assert "obstacles" not in found.keys
+        assert (found.keys["latitude"], found.keys["longitude"]) == found.origin
+
+
+def test_fences_of_a_plan_are_the_field_and_what_must_not_be_entered(tmp_path):
+    """Whichever is the largest: an exclusion is never the arena, and two fences are not one and an obstacle."""
+    site, square = FlightSite(47.0, 19.0, 100.0), [(-100, -100), (100, -100), (100, 100), (-100, 100)]
+    fence = [[y, x] for x, y in ring_at(site, square)]
+    circle = {"circle": {"center": [47.0, 19.0], "radius": 20.0}, "inclusion": False}
+    path = tmp_path / "field.plan"
+
+    def planned(polygons, circles):
+        path.write_text(json.dumps({"geoFence": {"polygons": polygons, "circles": circles}}))
+        return load_field(path)
+
+    inside, outside = ({"inclusion": inclusion, "polygon": fence} for inclusion in (True, False))
+    keys = planned([inside], [circle]).keys
+    assert Polygon(keys["corners"]).area == pytest.approx(200.0**2, rel=1e-4)
+    assert Polygon(keys["obstacles"][0]).buffer(0.01).covers(Point(0.0, 0.0).buffer(20.0)), "around the circle"
+    for polygons, circles, said in (
+        ([outside], [], "holds no polygon"),
+        ([inside, inside], [], "has several fences"),
+        ([inside], [{**circle, "inclusion": True}], "has several fences"),
+        ([{"polygon": fence}], [], "a fence without the key inclusion"),
+        ([inside], [{"circle": {"center": [47.0, 19.0], "radius": -1.0}, "inclusion": False}], "radius = -1.0 is not"),
+    ):
+        with pytest.raises(ScenarioError, match=f"field.plan: .*{said}"):
+            planned(polygons, circles)
+
+
+@pytest.mark.parametrize("kind", ["circle", "star", "comb", "walk"])
+def test_an_outline_of_very_many_corners_ends_in_one_line_or_a_field(tmp_path, kind, seed):
+    """None of them may end the process: a comb of 10^5 teeth used up the stack."""
+    rng, count = random.Random(seed), 99_000
+    turns = [2.0 * math.pi * k / count for k in range(count)]
+    radii = [rng.uniform(0.5, 1.0) if kind == "star" else 1.0 for _ in turns]
+    ring = [(19.0 + 2e-3 * r * math.cos(a), 47.0 + 1e-3 * r * math.sin(a)) for r, a in zip(radii, turns, strict=True)]
+    if kind == "comb":
+        ring = [(19.0 + 4e-3 * k / count, 47.0 + (1e-3 if k % 2 else 2e-3)) for k in range(count)] + [(19.002, 46.999)]
+    if kind == "walk":
+        ring = [(19.0 + 1e-3 * rng.random(), 47.0 + 1e-3 * rng.random()) for _ in turns]
+    path = written(tmp_path, polygon(ring))
+    if kind == "circle":
+        assert Polygon(load_field(path).keys["corners"]).area == pytest.approx(math.pi * 152.0 * 111.2, rel=3e-3)
+    else:
+        with pytest.raises(ScenarioError, match=r"an outline has \d+ corners, more than 500; world.simplify"):
+            load_field(path)

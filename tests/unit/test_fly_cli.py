@@ -1,11 +1,14 @@
 """The verbs fly and fleet: cards and keys are written whole or not at all, and mistakes are told all at once."""
 
 import json
+import math
 import os
+import random
 import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 
 import pytest
 
@@ -14,6 +17,7 @@ from airflock.drones.mavlink.signing import read_key
 from airflock.drones.onboard.card import read_card
 from airflock.drones.onboard.flight_log import LoggingNode, code_version
 from airflock.drones.onboard.node import Node, NodeMemory
+from airflock.support.coordinates import FlightSite
 
 HERE = ["--site", "47.5,19.04,120", "--members", "1-3", "--set", "world.side=120"]
 REAL = "vasarhelyi_2018/real_4ms"
@@ -97,6 +101,33 @@ def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airf
     code, _, lines = airflock("fly", "prepare", "dimock_2003/published", "--site", "47,19,0", "--members", "1-3")
     assert code == 2 and lines
     assert not list(tmp_path.iterdir())
+
+
+def test_a_field_is_flown_only_where_its_map_lies(airflock, tmp_path, seed):
+    """Drawn sites, on the field, near it and far from it; and maps whose latitude comes first."""
+    rng, counted = random.Random(seed), Counter()
+    for _ in range(50):
+        site = FlightSite(rng.uniform(20.0, 50.0), rng.uniform(70.0, 84.0), 0.0)  # either could be a latitude
+        offset = rng.choice([0.0, rng.uniform(2.0, 99.0), rng.uniform(101.0, 900.0), rng.uniform(1e4, 1e6)])
+        bearing, swapped = rng.uniform(0.0, 6.28), rng.random() < 0.3
+        ring = [site.to_geodetic(x, y, 0.0) for x, y in ((-90, -90), (90, -90), (90, 90), (-90, 90), (-90, -90))]
+        points = [(p.latitude, p.longitude)[:: 1 if swapped else -1] for p in ring]
+        (tmp_path / "a.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": [points]}))
+        place = site.to_geodetic(offset * math.cos(bearing), offset * math.sin(bearing), 0.0)
+        words = ["--set", "world.file=a.geojson", "--site", f"{place.latitude:.8f},{place.longitude:.8f},0"]
+        words += ["--set", "agents=3", "--members", "1-3", "--set", "world.arena=polygon"]
+        for file in tmp_path.glob("mission.*"):
+            file.unlink()
+        code, _, lines = airflock("fly", "prepare", REAL, *words)
+        text = "\n".join(lines)
+        counted[code, offset > 0.0, swapped] += 1
+        assert code == (2 if swapped or offset > 100.0 else 0), text
+        assert ("latitude and longitude seem to be exchanged" in text) is (swapped and offset < 2e4), text
+        assert ("its outline is flown at the site" in text) is (0.0 < offset < 100.0 and not swapped), text
+        if code:
+            assert not list(tmp_path.glob("mission.*")) and "--move-field" in text
+            assert airflock("fly", "prepare", REAL, *words, "--move-field")[0] == 0
+    assert len(counted) >= 5
 
 
 def test_what_a_card_leaves_off_is_said_in_a_line(airflock, tmp_path):

@@ -266,6 +266,10 @@ def prepare(
         float | None, typer.Option(help="Height of the flock, m above the site.", show_default="20")
     ] = None,
     margin: Annotated[float, typer.Option(min=0.0, help="Distance of the fence outside the law's walls, m.")] = 30.0,
+    move_field: Annotated[
+        bool,
+        typer.Option("--move-field", help="Fly the outline of a map at --site, though the map lies elsewhere."),
+    ] = False,
     hours: Annotated[float, typer.Option(min=0.1, max=168.0, help="How long card and key stay valid, h.")] = 12.0,
     limits: Annotated[
         list[str] | None, typer.Option("--limit", metavar="KEY=VALUE", help="Change a limit, for instance brake=2.")
@@ -286,7 +290,7 @@ def prepare(
     import secrets
 
     from airflock.drones import card_hash, new_operator_keys, parse_card
-    from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes
+    from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes, site_notes
 
     errors = options.collect_option_errors(ctx)
     where, systems = errors.read(options.parse_position, "--site", site), errors.read(_members, members)
@@ -313,12 +317,13 @@ def prepare(
         parse_card({**made, "hash": card_hash(made)}, str(out))
         return made
 
+    moved = errors.read(site_notes, loaded, where, move_field=move_field)
     document = errors.read(card_for, loaded)
     loads = errors.read(_check_airtimes, systems, document, fast_bits, slow_bits)
     errors.raise_errors()
     card = _write_mission(files, document, private)
     beside = deviation_notes(loaded, card.safety, len(card.members))
-    terminal.print_notes([*loaded.notes, *omission_notes(loaded), *beside])
+    terminal.print_notes([*loaded.notes, *omission_notes(loaded), *beside, *moved])
     if as_json:
         radio = {each.radio: each.share for each in loads}
         terminal.print_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})

@@ -10,6 +10,7 @@ from .card_document import (
     deviation_notes as deviation_notes,
     make_card_document as make_card_document,
     omission_notes as omission_notes,
+    site_notes as site_notes,
 )
 from .compare import fleet_recording as fleet_recording
 from .drone_faults import (

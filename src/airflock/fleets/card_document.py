@@ -11,7 +11,7 @@ from airflock.core import Parameters, forward, with_defaults
 from airflock.drones import CARD_VERSION, SafetyLimits
 from airflock.parts.bodies import Parameters as Multirotor
 from airflock.scenarios import Scenario
-from airflock.support import CardError, ScenarioError
+from airflock.support import CardError, FlightSite, ScenarioError
 from airflock.world import arena, inward_plane
 
 # ---- Parameters of single agents
@@ -105,7 +105,7 @@ def make_card_document(
         "body": {"kind": scenario.body.rule.name, **to_json_table(scenario.body.numbers)},
         "own": _member_differences(scenario, agent_records(scenario, len(members), seed)),
         **_group_numbers(scenario, len(members)),
-        "world": to_json_table(scenario.world),
+        "world": to_json_table(replace(scenario.world, latitude=None, longitude=None)),  # the site says where it is
         "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
         "radio": {
             "delay": scenario.radio.delay,
@@ -125,6 +125,39 @@ def make_card_document(
         "period": scenario.sensors.period or scenario.flight.dt,
         "seed": 0,
     }
+
+
+MOST_OFFSET = 100.0  # m; our choice: a site that is typed to 3 decimals is at most 80 m off
+EXACT = 1.0  # m; nearer, a site is as exact as it is typed
+
+
+def site_notes(scenario: Scenario, site: tuple[float, float, float], *, move_field: bool = False) -> list[str]:
+    """Return a note where a site is not the place of a scenario's map: its outline moves there.
+
+    move_field : fly the outline at any site
+    Raises CardError where they are farther than MOST_OFFSET apart.
+    """
+    latitude, longitude = scenario.world.latitude, scenario.world.longitude
+    if latitude is None or longitude is None:
+        return []
+    here = FlightSite(*site)
+    apart = math.hypot(*here.local(latitude, longitude, 0.0)[:2])
+    if apart <= EXACT:
+        return []
+    far = f"{apart / 1000.0:.3g} km" if apart >= 1000.0 else f"{apart:.3g} m"
+    place = (
+        f"the place of the field's map, {latitude:.7f},{longitude:.7f}, is {far} from --site {site[0]:g},{site[1]:g}"
+    )
+    if apart <= MOST_OFFSET or move_field:
+        return [f"{place}: its outline is flown at the site, {far} from where it is on the map"]
+    swapped = math.hypot(*here.local(longitude, latitude, 0.0)[:2]) <= max(MOST_OFFSET, 0.01 * apart)
+    hint = "; latitude and longitude seem to be exchanged: a map file has longitude first, --site latitude"
+    raise CardError(
+        [
+            f"{place}{hint if swapped else ''}; give the site of the map, the map of the site, or --move-field to fly "
+            "its outline at the site"
+        ]
+    )
 
 
 def omission_notes(scenario: Scenario) -> list[str]:

@@ -54,9 +54,15 @@ class Parameters(Record):
     heights: tuple[tuple[float, ...], ...] = points(
         "m", 2, meaning="lowest and highest height of each obstacle in 3-D, [[low, high], ...]; by default without end"
     )
+    latitude: float | None = quantity(
+        None, "deg", low=-85.0, high=85.0, meaning="latitude of the point 0, 0, where it is known, as of a map file"
+    )
+    longitude: float | None = quantity(
+        None, "deg", low=-180.0, high=180.0, meaning="longitude of that point; fly prepare compares it with --site"
+    )
     file: str = text(
-        meaning="GeoJSON or KML file with the arena: its largest polygon gives world.corners, holes and polygons in it "
-        "are obstacles; beside the scenario or absolute"
+        meaning="GeoJSON, KML or QGroundControl .plan file with the arena: its largest polygon gives world.corners, "
+        "holes and polygons in it are obstacles; beside the scenario or absolute"
     )
     simplify: float = quantity(
         0.0, "m", low=0.0, high=1000.0, meaning="file: how far outlines may move to have fewer corners"
