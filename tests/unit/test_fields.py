@@ -123,7 +123,8 @@ def test_faults_of_a_file_come_together_and_name_what_they_are_of(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "said"), [
-    ("no.geojson", "no such file"), ("a.kmz", "unzip it first"), ("a.shp", "ends in none of .geojson, .json, .kml, .plan"),
+    ("no.geojson", "no such file"), ("a.kmz", "unzip it first"),
+    ("a.shp", "ends in none of .geojson, .json, .kml, .plan"),
 ])  # fmt: skip
 def test_a_file_of_no_use_is_one_line(tmp_path, name, said):
     if name.startswith("a"):

@@ -1,6 +1,7 @@
 """Scenes, goals, starts and displays that cannot be meant end with a clear line, or a note of what was done."""
 
 import json
+import random
 import re
 
 import numpy as np
@@ -12,6 +13,7 @@ from airflock.support.errors import AirflockError, FlightError, ScenarioError
 from airflock.world.scenery import Parameters
 from airflock.world.scenes import meshes
 from airflock.world.scenes.scene_builder import in_mesh, scene_of
+from airflock.world.shapes import TRIANGLE
 from needed import needed
 
 trimesh = needed("trimesh")
@@ -146,6 +148,67 @@ def test_a_scene_in_the_wrong_unit_is_refused_with_a_guess(tmp_path, size, unit)
     trimesh.creation.box(extents=[size] * 3).export(path)
     with pytest.raises(ScenarioError, match="may be in another unit, try scene.unit"):
         fly_in(path)
+
+
+MISTAKES = {  # of a mesh: how its corners are changed, and what a note or an error then says
+    "none": (lambda c, rng: c, ""),
+    "mm": (lambda c, rng: 1000.0 * c, r"scene.unit = 0.001"),
+    "cm": (lambda c, rng: 100.0 * c, r"scene.unit = 0.01 it is"),
+    "inches": (lambda c, rng: c / 0.0254, r"scene.unit = (0.0254|0.01) it is"),
+    "map": (lambda c, rng: c + [rng.uniform(2e5, 8e5), rng.uniform(1e6, 9e6), 0.0], "map coordinates .UTM."),
+    "altitude": (lambda c, rng: c + [0.0, 0.0, rng.uniform(200.0, 2000.0)], "heights above sea level"),
+    "y up": (lambda c, rng: np.stack([c[:, 0], c[:, 2], -c[:, 1]], axis=1), "scene.up = 'y'"),
+}
+DOUBTS = "times as wide|map coordinates|point up in the file"
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mesh_that_hardly_fits_its_arena_is_questioned_and_a_sound_one_is_not(tmp_path, seed, mistake):
+    """Sites of a plate and some towers, drawn at random, in all formats; the same sites with one mistake each."""
+    rng = random.Random(f"{seed} {mistake}")
+    change, said = MISTAKES[mistake]
+    for number in range(50):
+        side = rng.uniform(60.0, 300.0)
+        parts = [trimesh.creation.box(bounds=[[-0.5 * side, -0.5 * side, -1.0], [0.5 * side, 0.5 * side, 0.0]])]
+        for _ in range(rng.randint(1, 5)):
+            x, y = (rng.uniform(-0.4, 0.35) * side for _ in range(2))
+            w, top = rng.uniform(2.0, 0.05 * side), rng.uniform(5.0, 60.0)
+            parts.append(trimesh.creation.box(bounds=[[x, y, 0.0], [x + w, y + w, top]]))
+        site = trimesh.util.concatenate(parts)
+        truth = site.bounds.copy()
+        kind = rng.choice(["stl", "obj", "ply"] + (["glb"] if mistake != "y up" else []))
+        site.vertices = change(np.asarray(site.vertices, float), rng)
+        if kind == "glb":  # whose y is up
+            site.vertices = np.stack([site.vertices[:, 0], site.vertices[:, 2], -site.vertices[:, 1]], axis=1)
+        site.export(tmp_path / f"{number}.{kind}")
+        keys = {"scene.kind": "mesh", "scene.file": str(tmp_path / f"{number}.{kind}"), "world.walls": "every_edge"}
+        keys |= {"world.dimensions": "3", "world.side": rng.uniform(0.5, 1.5) * side, "world.floor": 0.0, "agents": 4}
+        try:
+            found = airflock.load("vasarhelyi_2018/real_4ms", {**keys, "start.separation": 3.0, "world.ceiling": 80.0})
+            lines = "\n".join(found.notes)
+        except ScenarioError as error:
+            lines = str(error)
+            assert mistake != "none", lines
+        assert re.search(said, lines) if said else not re.search(DOUBTS, lines), (kind, lines)
+        if not said:
+            rows = scene_of(found.scene, 3).shapes
+            rows = rows[rows[:, 6] == TRIANGLE]
+            assert np.allclose(rows[:, :3].min(axis=0), truth[0], atol=0.01), "upright, whatever the format"
+            assert np.allclose(rows[:, 3:6].max(axis=0), truth[1], atol=0.01)
+
+
+def test_an_arena_inside_a_solid_is_no_place_to_start(tmp_path, seed):
+    """Of random places in a region that is shut none may look free: each would be found by drawing again."""
+    rng = random.Random(seed)
+    for number in range(5):
+        half = rng.uniform(500.0, 5000.0)
+        path = tmp_path / f"{number}.stl"
+        tower = trimesh.creation.box(bounds=[[-half, -half, 0.0], [half, half, half]])
+        plate = trimesh.creation.box(bounds=[[-9.0 * half, -9.0 * half, -50.0], [9.0 * half, 9.0 * half, 0.0]])
+        trimesh.util.concatenate([tower, plate]).export(path)
+        keys = {"scene.kind": "mesh", "scene.file": str(path), "world.dimensions": "3", "world.walls": "every_edge"}
+        with pytest.raises(ScenarioError, match="the whole region in which agents start lies inside"):
+            airflock.load("vasarhelyi_2018/real_4ms", {**keys, "agents": 4, "world.side": 100.0, "world.height": 60.0})
 
 
 def test_damaged_and_strange_mesh_files_are_refused(tmp_path, hall, monkeypatch):

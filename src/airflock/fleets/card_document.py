@@ -145,9 +145,7 @@ def site_notes(scenario: Scenario, site: tuple[float, float, float], *, move_fie
     if apart <= EXACT:
         return []
     far = f"{apart / 1000.0:.3g} km" if apart >= 1000.0 else f"{apart:.3g} m"
-    place = (
-        f"the place of the field's map, {latitude:.7f},{longitude:.7f}, is {far} from --site {site[0]:g},{site[1]:g}"
-    )
+    place = f"--site {site[0]:g},{site[1]:g} is {far} from the field's map, {latitude:.7f},{longitude:.7f}"
     if apart <= MOST_OFFSET or move_field:
         return [f"{place}: its outline is flown at the site, {far} from where it is on the map"]
     swapped = math.hypot(*here.local(longitude, latitude, 0.0)[:2]) <= max(MOST_OFFSET, 0.01 * apart)

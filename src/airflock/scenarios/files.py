@@ -343,13 +343,7 @@ def _kind_with_path(entry: Any, folder: Path) -> Any:
 # --- Fields from a map file: the key world.file ---
 
 FROM_FILE = ("world.file", "world.simplify")
-GIVEN = (
-    "corners",
-    "obstacles",
-    "heights",
-    "latitude",
-    "longitude",
-)  # keys that come from the map file, so the scenario may not have them
+GIVEN = ("corners", "obstacles", "heights", "latitude", "longitude")  # come from the map file
 INSTEAD = {"arena": "square", "side": 1e6}  # of a file that cannot be read, so that all else is judged in wide room
 
 

@@ -4,25 +4,30 @@ The first half checks starts and goals against the scene; `FlightWorld` and `Goa
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import Point
 
 from airflock.core import FAR, Model, State, call_rule
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.scenario_checks import ground_plan
 from airflock.support import SceneError
 from airflock.world import (
     EDGE_RULES,
+    GROUND,
     Scene,
     Shapes,
     WorldMap as Map,
+    arena,
     bvh,
     clearance,
     goals,
     half_sizes,
+    heights_of,
     in_mesh,
     inside,
     scene_of,
@@ -58,7 +63,7 @@ def scene_errors(scenario: Scenario, started: bool = False) -> list[str]:
         points = scenario.waypoints()
     except SceneError as error:
         return str(error).splitlines()
-    errors = []
+    errors, doubts = [], _mesh_doubts(scenario)
     for number, point in enumerate(points):
         depth = _depth(place, point)
         if depth > 0.0:
@@ -72,12 +77,12 @@ def scene_errors(scenario: Scenario, started: bool = False) -> list[str]:
             "start: the whole region in which agents start lies inside what stands in the scene, or nearer to it than "
             f"start.clearance = {scenario.start.clearance:g} m; enlarge the region or lower scene.density"
         )
-    return errors
+    return errors + doubts if errors else []
 
 
 def scene_notes(scenario: Scenario) -> list[str]:
     """Return notes on the scene and on starts in it."""
-    notes = list(scenario.stands().notes)
+    notes = [*scenario.stands().notes, *_mesh_doubts(scenario)]
     share = _blocked(scenario)
     if share > CROWDED:
         notes.append(
@@ -86,6 +91,51 @@ def scene_notes(scenario: Scenario) -> list[str]:
         )
     if scenario.goals.role == "herd" and not getattr(scenario.parameters, "s_goal", -1.0) < 0.0:
         notes.append("goals.role = 'herd': a flock with model.s_goal >= 0 follows the shepherd instead of fleeing it")
+    return notes
+
+
+WIDE = 25.0  # times as wide as the arena, from which on a mesh may be in inches, centimetres or millimetres
+WIDEST = 2e4  # m; the same without an arena
+BELOW, UPRIGHT = 0.25, 0.2  # share of a mesh below the ground; of the same mesh stood upright
+
+
+def _mesh_doubts(scenario: Scenario) -> list[str]:
+    """Return notes where a mesh hardly fits the arena: its size, its place, its axis that points up."""
+    scene, world, begin = scenario.scene, scenario.world, scenario.start
+    if scene.kind != "mesh":
+        return []
+    rows = scene_of(scene, scenario.dimensions).shapes
+    rows, where = rows[rows[:, 6] != GROUND], f"scene.file = {scene.file}"
+    low, high = rows[:, :3].min(axis=0), rows[:, 3:6].max(axis=0)
+    width, size = float((high - low)[:2].max()), high - low
+    plan = ground_plan(world)
+    half = begin.radius if begin.kind == "ball" else 0.5 * begin.side
+    west, south, east, north = plan.bounds if plan is not None else (-half, -half, half, half)
+    across, notes = max(east - west, north - south), []
+    if width > (WIDE * across if plan is not None else WIDEST):
+        arena = f", {width / across:.4g} times as wide as the arena, {across:,.0f} m" if plan is not None else ""
+        unit = min((1e-3, 0.01, 0.0254), key=lambda u: abs(math.log(u * width / scene.unit / max(across, 100.0))))
+        notes.append(
+            f"{where}: the mesh is {width:,.0f} m wide{arena}: is scene.unit = {scene.unit:g} m the unit of the file? "
+            f"with scene.unit = {unit:g} it is {width * unit / scene.unit:,.3g} m"
+        )
+    floor, top = heights_of(world) if plan is not None and scenario.dimensions == 3 else (-math.inf, math.inf)
+    beside = [max(low[a] - end, start - high[a], 0.0) for a, (start, end) in enumerate(((west, east), (south, north)))]
+    if any(beside) or low[2] > top or high[2] < floor:
+        middle = ", ".join(f"{c:.4g}" for c in 0.5 * (low + high)[: scenario.dimensions])
+        notes.append(
+            f"{where}: the mesh does not reach {'the arena' if plan is not None else 'where agents start'}: its middle "
+            f"is at [{middle}] m; are these map coordinates (UTM) or heights above sea level? move its origin"
+        )
+    # Of a mesh that lies on its side half is below the ground, and the axis that is up in truth begins near 0.
+    turned = scene.up == "y" or scene.file.lower().endswith((".glb", ".gltf")) and scene.up == "standard"
+    other = (-high[1], size[1]) if turned else (low[1], size[1])
+    lying = scenario.dimensions == 3 and scene.ground == "yes" and -low[2] > BELOW * size[2] and low[2] > -WIDEST
+    if lying and -UPRIGHT * other[1] <= other[0] <= UPRIGHT * other[1]:
+        notes.append(
+            f"{where}: {min(-low[2] / size[2], 1.0):.0%} of its height lies below the ground, down to {low[2]:.4g} m: "
+            f"does {'z' if turned else 'y'} point up in the file? then write scene.up = '{'z' if turned else 'y'}'"
+        )
     return notes
 
 
@@ -140,22 +190,38 @@ def _depth(place: Scene, point: NDArray[np.float64]) -> float:
 
 def _blocked(scenario: Scenario) -> float:
     """Return the share of the start region in which no agent can start."""
-    if scenario.scene.kind == "none" or scenario.start.kind == "arena":
+    if scenario.scene.kind == "none" or (scenario.start.kind == "arena" and scenario.world.arena == "none"):
         return 0.0
-    return _blocked_share(scenario.scene, scenario.start, scenario.dimensions)
+    return _blocked_share(scenario.scene, scenario.start, scenario.world)
 
 
-@lru_cache(maxsize=64)
-def _blocked_share(scene: scenery.Parameters, begin: start.Parameters, dims: int) -> float:
-    place = scene_of(scene, dims)
-    if not len(place.shapes):
-        return 0.0
-    reach, rng, shut = begin.radius if begin.kind == "ball" else 0.5 * begin.side, np.random.default_rng(0), 0
-    for number in range(1, MOST_DRAWS + 1):
-        spot = rng.uniform(-1.0, 1.0, 3) * (1.0, 1.0, float(dims == 3))
+def _start_region(begin: start.Parameters, world: arena.Parameters) -> Iterator[NDArray[np.float64]]:
+    """Yield random places (m) of the region in which agents start."""
+    reach, rng = begin.radius if begin.kind == "ball" else 0.5 * begin.side, np.random.default_rng(0)
+    space = world.dimensions == "3"
+    plan, (low, high) = ground_plan(world), heights_of(world) if space else (0.0, 0.0)
+    while True:
+        spot = rng.uniform(-1.0, 1.0, 3) * (1.0, 1.0, float(space))
         if begin.kind == "ball":
             spot *= min(1.0, 1.0 / max(float(np.linalg.norm(spot)), 1e-9))
         spot *= reach
+        if begin.kind == "arena":
+            west, south, east, north = plan.bounds
+            spot = rng.uniform((west, south, low), (east, north, high))
+            if not plan.contains(Point(spot[:2])):
+                continue
+        yield spot
+
+
+@lru_cache(maxsize=64)
+def _blocked_share(scene: scenery.Parameters, begin: start.Parameters, world: arena.Parameters) -> float:
+    dims = int(world.dimensions)
+    place = scene_of(scene, dims)
+    if not len(place.shapes):
+        return 0.0
+    spots, shut = _start_region(begin, world), 0
+    for number in range(1, MOST_DRAWS + 1):
+        spot = next(spots)
         shut += clearance(place, spot, begin.clearance) < begin.clearance or in_mesh(place, spot)
         if number >= FIRST_DRAWS and shut < number:  # only a region that looks shut is looked at for longer
             break

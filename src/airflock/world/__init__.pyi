@@ -34,6 +34,7 @@ from .shapes import (
     BOX as BOX,
     COLUMNS as COLUMNS,
     CYLINDER as CYLINDER,
+    GROUND as GROUND,
     SEGMENT as SEGMENT,
     TRIANGLE as TRIANGLE,
 )

@@ -2,8 +2,8 @@
 
 A line from within a closed surface leaves it once more than it enters it, whichever way it goes. So the number of
 crossings outwards less those inwards (the winding number) is 0 outside and within a cavity, and not 0 inside, also
-where closed bodies overlap or are turned inside out. Three lines must agree, because one through an edge that two
-triangles share may count it twice.
+where closed bodies overlap or are turned inside out. Two lines of three decide, because one through an edge that two
+triangles share may count it twice: random places in a region that is shut would find each place where a line errs.
 """
 
 from airflock.core import FAR
@@ -54,8 +54,8 @@ def inside(x, y, z, shapes, nodes, links):
     """1.0 if a position lies within closed surfaces made of triangles or, in a plane, of segments; else 0.0."""
     # Three directions without a rational relation to axes or to each other: edges of buildings are
     # parallel to axes, and one line through a shared edge may count it twice.
-    if winding(x, y, z, 0.3103, 0.1702, 0.9353, shapes, nodes, links) == 0.0:
-        return 0.0
-    if winding(x, y, z, -0.6403, 0.5401, -0.5462, shapes, nodes, links) == 0.0:
-        return 0.0
+    first = winding(x, y, z, 0.3103, 0.1702, 0.9353, shapes, nodes, links)
+    second = winding(x, y, z, -0.6403, 0.5401, -0.5462, shapes, nodes, links)
+    if (first == 0.0) == (second == 0.0):
+        return 0.0 if first == 0.0 else 1.0
     return 0.0 if winding(x, y, z, 0.5507, -0.8206, -0.1536, shapes, nodes, links) == 0.0 else 1.0

@@ -49,4 +49,6 @@ class Parameters(Record):
     )
     file: str = text(meaning="mesh: file of triangles (glTF, OBJ, STL and others), beside the scenario or absolute")
     unit: float = quantity(1.0, "m", low=1e-6, high=1e6, meaning="mesh: length of one unit of the file")
-    up: str = choice("z", ("z", "y"), meaning="mesh: axis of the file that points up; y in glTF")
+    up: str = choice(
+        "standard", ("standard", "z", "y"), meaning="mesh: axis of the file that is up; by standard y in glTF, else z"
+    )

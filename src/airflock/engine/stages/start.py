@@ -60,8 +60,8 @@ def is_free(free: Any, s: Any, w: Any, scene: Any, *, plan: Plan) -> Any:
         if free:
             free = bvh.nearest(s[X], s[Y], s[Z], w.clearance, *scene_tree(scene)).distance >= w.clearance
         # Parity of crossings is wrong where buildings of a city model overlap (inside both it is
-        # even); a winding number over the closed parts is not. Three lines must agree, as one may
-        # pass through an edge of two triangles.
+        # even); a winding number over the closed parts is not. Of three lines two decide, as one
+        # may pass through an edge of two triangles.
         if plan.has_mesh and free:
             free = inside(s[X], s[Y], s[Z], *scene_tree(scene)) < HALF
     return free

@@ -85,7 +85,12 @@ def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64]
     mesh = read_mesh(expand_path(p.file))
     notes = []
     corners = np.asarray(mesh.vertices, float) * p.unit
-    if p.up == "y":
+    gltf = p.up == "standard" and Path(p.file).suffix.lower() in (".glb", ".gltf")
+    if gltf:
+        notes.append(
+            f"scene.file = {p.file}: glTF has y up by its standard, and is turned upright; scene.up = 'z' leaves it"
+        )
+    if gltf or p.up == "y":
         corners = np.stack([corners[:, 0], -corners[:, 2], corners[:, 1]], axis=1)
     faults = mesh_size_errors(p, corners)
     if faults:
