@@ -132,10 +132,9 @@ def evolve(
     errors.raise_errors()
     study, taken = found
     study = resolve_device(study, device)
-    open_folder(out, study, resume=resume)
-    terminal.print_notes(
-        [*(note for each in study.scenarios for note in each.notes), *study.notes, *([taken] if taken else [])]
-    )
+    mended = open_folder(out, study, resume=resume)
+    notes = [*(note for each in study.scenarios for note in each.notes), *study.notes, taken, mended]
+    terminal.print_notes([note for note in notes if note])
     begin = time.perf_counter()
     executor = study_executor(study, scheduler, threads, timeout)
     with search_progress(study, quiet or as_json) as (watch, note):
@@ -171,6 +170,8 @@ def _print_optimum(result: Any) -> None:
         f"{result.above} of {result.candidate_count} candidates reach the mean; {result.failed} failed",
         highlight=False,
     )
+    for reason, count in result.reasons.items():
+        console.print(f"failed flights: {count}; {reason}", highlight=False, markup=False, soft_wrap=True)
     for entry in result.limits:
         console.print(limit_report_line(entry), highlight=False, markup=False, soft_wrap=True)
     for name, (mean, low, high) in result.scenarios.items():

@@ -152,6 +152,32 @@ class FlightStore:
         rows = [(json.dumps(list(values)), *batch, i) for i, values in enumerate(fitness)]
         self._many("UPDATE candidate SET fitness=? WHERE stage=? AND run=? AND generation=? AND candidate=?", rows)
 
+    def judge_again(self) -> None:
+        """Note that fitness has changed: what was found by it goes, and the search may ask for other candidates."""
+        with as_study_error(self.path):
+            self.connection.execute("PRAGMA user_version = 1")
+            self.connection.execute("DELETE FROM flight WHERE stage <> 'search'")
+            self.connection.execute("DELETE FROM candidate WHERE stage <> 'search'")
+            self.connection.execute("UPDATE flight SET reason = '' WHERE scores IS NOT NULL")
+
+    def forget_from(self, batch: CandidateBatch) -> bool:
+        """Remove a generation of the search and all after it, if fitness has changed; else return False."""
+        if not self.rows("PRAGMA user_version")[0][0]:
+            return False
+        for table in ("flight", "candidate"):
+            later = f"DELETE FROM {table} WHERE stage = ? AND (run, generation) >= (?, ?)"
+            with as_study_error(self.path):
+                self.connection.execute(later, batch)
+        return True
+
+    def reasons(self) -> dict[str, int]:
+        """Return why flights of the search failed, and how many each, the most frequent reason first."""
+        found = self.rows(
+            "SELECT reason, count(*) FROM flight WHERE stage='search' AND reason <> '' "
+            "GROUP BY reason ORDER BY 2 DESC, 1"
+        )
+        return {str(reason): int(count) for reason, count in found}
+
     def count(self, stage: str = "search") -> int:
         """Flights of a stage."""
         with as_study_error(self.path):

@@ -1,18 +1,23 @@
 """The folder of a study: made or opened again, its study.toml compared before anything is written."""
 
 import hashlib
+import os
 import platform
+import re
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
 from airflock import __version__
+from airflock.runs.flight_store import FlightStore
 from airflock.scenarios import Scenario
 from airflock.support import StudyError, as_error, atomic, processor_name, read_toml
 
 STUDY_FILE = "study.toml"
 PACKAGES = ("numpy", "numba", "cma", "pymoo")
+
+FITNESS_TEXT = re.compile(r"objective\[\d+\]\.own = ")  # a difference of two studies that may go on in one folder
 
 
 class Interrupted(StudyError):
@@ -26,17 +31,29 @@ class HasDocument(Protocol):
         """Return everything that decides its result, as plain values."""
 
 
-def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "study") -> None:
+def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "study") -> str:
     """Make a study's folder, or check that it holds this very study; likewise for another kind, such as a campaign.
+
+    A fitness of the user's own may have been mended since: flights that are stored are judged by it. Returns a note of
+    that, or "".
 
     Raises StudyError where the folder holds another study, or this one and `resume` is False.
     """
     found = folder / f"{kind}.toml"
     if found.is_file():
-        same_or_refuse(folder, read_toml_file(found), to_toml_values(study.document()), kind)
+        held, now = read_toml_file(found), to_toml_values(study.document())
+        changed = differences(held, now)
+        mended = resume and bool(changed) and all(FITNESS_TEXT.match(line) for line in changed)
+        if not mended:
+            same_or_refuse(folder, held, now, kind)
         if not resume:
             raise StudyError(f"{folder}: already holds this {kind}; continue it with --resume, or give another --out")
-        return
+        if not mended:
+            return ""
+        with FlightStore(folder) as store:
+            store.judge_again()
+        write_toml_file(found, study.document(), f"A {kind} of Airflock. Its fitness was changed after it had begun.")
+        return f"the fitness has changed ({'; '.join(changed)}): flights of {folder} are judged by the one of now"
     if resume:
         raise StudyError(f"{folder}: holds no {kind} to resume ({found.name} is missing)")
     # hidden files: what a process that was killed had begun to write
@@ -47,6 +64,7 @@ def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "
         write_toml_file(found, study.document(), f"A {kind} of Airflock. Written once, when it began.")
     except OSError as error:
         raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
+    return ""
 
 
 def remove_unfinished(folder: Path) -> None:
@@ -131,13 +149,24 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any], at: str = "") ->
         before, after = old.get(key), new.get(key)
         if isinstance(before, Mapping) and isinstance(after, Mapping):
             found += differences(before, after, f"{where}.")
+        elif (
+            isinstance(before, list) and isinstance(after, list) and len(before) == len(after)
+            and all(isinstance(entry, Mapping) for entry in (*before, *after))
+        ):  # fmt: skip
+            for place, (one, other) in enumerate(zip(before, after, strict=True)):
+                found += differences(one, other, f"{where}[{place}].")
         elif before != after:
-            found.append(f"{where} = {_shown(before)} there, {_shown(after)} now")
+            same = len(os.path.commonprefix([str(before), str(after)]))
+            found.append(f"{where} = {_shown(before, same)} there, {_shown(after, same)} now")
     return found
 
 
-def _shown(value: Any) -> str:
-    return "missing" if value is None else str(value) if len(str(value)) < 60 else f"{str(value)[:57]}..."
+def _shown(value: Any, same: int) -> str:
+    """Return the text of a value, a long one from some letters before the first that differs."""
+    text, first = "missing" if value is None else str(value), max(same - 20, 0)
+    if len(text) < 60:
+        return text
+    return f"{'...' if first else ''}{text[first : first + 54]}{'...' if len(text) > first + 54 else ''}"
 
 
 def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any], kind: str = "study") -> None:

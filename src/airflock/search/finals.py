@@ -84,6 +84,7 @@ def conclude_study(
         above=len(good),
         candidate_count=len(table),
         failed=int(table[first.name].isna().sum()),
+        reasons=store.reasons(),
         finalists=finalist_table(study, points, origins, rows),
         dead_reason=_dead(study, flown),
         scenarios=each,
@@ -106,8 +107,8 @@ def _sound_candidates(study: Study, store: FlightStore, table: pd.DataFrame, fol
         whole = whole.assign(**{EXCESS_COLUMN: candidate_excesses(study, store, whole)})
     sound = sort_by_fitness(whole, first.name, first.maximise)
     if not len(sound):
-        reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
-        raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
+        reason = next(iter(store.reasons()), f"{first.name} is nan, no number")
+        raise StudyError(f"{folder}: every candidate failed; the first one: {reason}")
     return sound
 
 

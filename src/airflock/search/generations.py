@@ -6,7 +6,7 @@ from its first generation on and comes to the very state in which it was left. N
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import Any
 
@@ -92,13 +92,26 @@ class Evaluator:
     def _fly(self, batch: CandidateBatch, missing: Sequence[Flight], flown: FlightScores) -> None:
         """Fly what is missing; each flight is stored and known as soon as it lands."""
         for landed in self.executor.fly(missing):
+            if landed.values is not None:
+                first = all(values is None for values in flown.values())
+                landed = replace(landed, reason=landed.reason or self._fitness_error(landed.values, first))
             self.store.land(batch, landed)
-            if landed.values is not None and all(values is None for values in flown.values()):
-                for objective in self.study.objectives:  # a fault in one shows at the first flight
-                    objective.of_flight(landed.values)
             flown[landed.flight.candidate_index, landed.flight.repeat] = landed.values
             if self.note:
                 self.note(True)
+
+    def _fitness_error(self, values: Mapping[str, Any], first: bool) -> str:
+        """Return how a fitness of the user's own fails for a flight, or "". Raises StudyError for errors of its text."""
+        lines = []
+        for objective in self.study.objectives:
+            line, of_numbers = objective.error_of_flight(values)
+            # An error in the text shows at the first flight; one that comes later is of a flight.
+            if first and line and not of_numbers:
+                raise StudyError(line)
+            if first:
+                objective.of_flight(values)  # raises where an order parameter is unknown
+            lines += [line] if line else []
+        return "; ".join(lines)
 
     def _still_needed(self, flown: FlightScores, alive: Sequence[int], seen: int, last: int) -> list[int]:
         """Return the candidates that fly on after `seen` of `last` seeds."""
@@ -228,14 +241,18 @@ def refuse_flat(study: Study, store: FlightStore, generation: int, values: Seque
     generation : number of the generation, of those with whole flights, from 0
     values     : first objective of every candidate so far that flew a whole flight
     """
-    found = [value for value in values if value is not None]
+    found, name = [value for value in values if value is not None], study.objectives[0].name
     last = generation + 1 == study.whole("generations")
-    if len(found) < FEWEST or not (generation + 1 == EARLY or (last and generation < EARLY)):
+    if len(values) < FEWEST or not (generation + 1 >= EARLY or last):
+        return
+    if not found:
+        why = next(iter(store.reasons()), f"{name} is nan, no number, for all of {len(values)} candidates")
+        raise StudyError(f"{study.scenario.name}: every candidate failed; the first one: {why}")
+    if len(found) < FEWEST:
         return
     if max(found) - min(found) <= 1e-12 * max(1.0, abs(max(found))):
-        name = study.objectives[0].name
         raise StudyError(
-            f"{study.scenario.name}: nothing to search: {name} = {found[0]:g} for all of {len(found)} candidates"
+            f"{study.scenario.name}: nothing to search: {name} is flat, {found[0]:g} for all of {len(found)} candidates"
             f"{zero_fitness_reason(search_scores(store)) if found[0] == 0.0 else ''}"
         )
 
@@ -440,6 +457,8 @@ def _asked(store: FlightStore, batch: CandidateBatch, points: NDArray[np.float64
     # A rebuilt optimiser may differ in the last bits on another machine. A larger difference is
     # another optimiser, which would learn from flights of points that are not its own.
     if known.shape != points.shape or not np.allclose(known, points, rtol=0.0, atol=SAME):
+        if store.forget_from(batch):
+            return points
         raise StudyError(
             f"{store.path}: run {batch.run}, generation {batch.generation} cannot be rebuilt here: the optimiser asks "
             "for other candidates than are stored; continue with the versions that the table session names"

@@ -48,12 +48,12 @@ class Objective:
     text: str = ""
 
     def of_flight(self, values: Mapping[str, Any]) -> float:
-        """Value of one flight; nan where it is not finite."""
+        """Value of one flight; nan where it is not finite, or where a function of the user's own fails."""
         if self.own is None and self.name not in values:
             known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
             raise StudyError(f"objective {self.name}: unknown order parameter; known: {known}")
         if self.own is not None:
-            value = user_fitness(self.own, self.name, values)
+            value = user_fitness(self.own, self.name, values)[0]
         elif isinstance(values[self.name], (int, float)):
             value = float(values[self.name])
         else:
@@ -73,18 +73,26 @@ class Objective:
             return float(np.quantile(found, self.quantile if self.maximise else 1.0 - self.quantile))
         return math.fsum(found) / len(found)
 
+    def error_of_flight(self, values: Mapping[str, Any]) -> tuple[str, bool]:
+        """Return how the user's own function fails for a flight, "" where it does not; and True if in its numbers."""
+        return ("", False) if self.own is None else user_fitness(self.own, self.name, values)[1:]
 
-def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) -> float:
-    """Call the user's own function for one flight; an error in it becomes one line with its place."""
+
+def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) -> tuple[float, str, bool]:
+    """Call the user's own function for one flight; an error in it becomes nan and one line with its place.
+
+    The last value is True for an error of arithmetic, which a flight may cause; others are rather in the text.
+    """
     try:
-        return float(function(values))
+        return float(function(values)), "", False
     except Exception as error:  # the user's own function may fail in any way
         last = traceback.extract_tb(error.__traceback__)[-1]
         code = getattr(function, "__code__", None)
         place = f"{last.filename}:{last.lineno}"
         if last.filename == __file__ and code is not None:  # it returned, but no number
             place = f"{code.co_filename}:{code.co_firstlineno}"
-        raise StudyError(f"objective {name}: {place}: {describe_error(error)}") from error
+        line = f"objective {name}: {place}: {describe_error(error)}"
+        return math.nan, line, isinstance(error, ArithmeticError)
 
 
 def candidate_losses(

@@ -34,6 +34,7 @@ class EvolveResult:
     ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's fitness
     finalists  : one row each: origin, parameters, fitness on fresh seeds
     failed     : candidates of the search that failed
+    reasons    : why flights of the search failed → how many of them
     scenarios  : of several: what each is called → mean, low and high of the winner's fitness in it
     limits     : what the winner's fresh flights say of each limit: events, flights, estimated and allowed probability
     dead_reason : why nothing flies; then no best.toml is written; empty if something flies
@@ -57,6 +58,7 @@ class EvolveResult:
     dead_reason: str = ""
     scenarios: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     limits: tuple[Mapping[str, Any], ...] = ()
+    reasons: Mapping[str, int] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<{result_summary(self)}>"
@@ -95,6 +97,7 @@ class EvolveResult:
             "working_ranges": {
                 "candidates": self.candidate_count,
                 "failed": self.failed,
+                **({"reasons": dict(self.reasons)} if self.reasons else {}),
                 "above_mean": self.above,
                 "range": {key: list(span) for key, span in self.ranges.items()},
             },
