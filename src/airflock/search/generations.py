@@ -101,7 +101,7 @@ class Evaluator:
                 self.note(True)
 
     def _fitness_error(self, values: Mapping[str, Any], first: bool) -> str:
-        """Return how a fitness of the user's own fails for a flight, or "". Raises StudyError for errors of its text."""
+        """Return how a fitness of the user's own fails for a flight, or "". Raises StudyError for one of its text."""
         lines = []
         for objective in self.study.objectives:
             line, of_numbers = objective.error_of_flight(values)
