@@ -1,5 +1,6 @@
 """Devices are picked by the size of the work, and what is missing is said in one line."""
 
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -154,3 +155,13 @@ def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.strip() == "airflock: device = cuda: no driver; choose device = cpu or auto"
+
+
+def test_a_numba_that_compiles_nothing_is_named_and_plain_python_flies_on():
+    words = [sys.executable, "-m", "airflock", "run", "vasarhelyi_2018/4ms", "--agents", "3", "--duration", "0.1"]
+    told = "airflock: NUMBA_DISABLE_JIT is set, so Numba compiles nothing: unset it, or fly with --device python"
+    for more, status in (([], 2), (["--device", "python"], 0)):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+        done = subprocess.run([*words, *more], capture_output=True, text=True, env=environment, check=False)
+        assert done.returncode == status and done.stderr.startswith(told if status else ""), done.stderr
+        assert done.stderr.count("\n") == (1 if status else 0)

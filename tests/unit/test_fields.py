@@ -4,6 +4,7 @@ import json
 import math
 import random
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -432,3 +433,18 @@ def test_an_outline_of_very_many_corners_ends_in_one_line_or_a_field(tmp_path, k
     else:
         with pytest.raises(ScenarioError, match=r"an outline has \d+ corners, more than 500; world.simplify"):
             load_field(path)
+
+
+def test_polygons_that_cross_are_one_line_each_and_no_warning_of_a_library(tmp_path, seed):
+    rng = random.Random(seed)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(50):
+            rings = [[[19.0 + 1e-3 * rng.random(), 47.0 + 1e-3 * rng.random()] for _ in range(rng.randint(4, 9))]
+                     for _ in range(rng.randint(1, 3))]  # fmt: skip
+            lines = []
+            try:
+                load_field(written(tmp_path, *map(polygon, rings)))
+            except ScenarioError as error:
+                lines = error.faults
+            assert all(" crosses or touches itself " in line or " outside feature " in line for line in lines), lines

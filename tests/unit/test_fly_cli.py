@@ -73,6 +73,18 @@ def test_a_mission_is_prepared_checked_and_never_overwritten(airflock, tmp_path)
     assert code == 2 and len(lines) == 3 and all("never overwritten" in line for line in lines)
 
 
+def test_a_computer_whose_clock_was_not_set_is_noted(airflock, tmp_path, monkeypatch):
+    """It starts in 1970, or where it was stopped: the card would be valid for longer than cards are."""
+    assert airflock("fly", "prepare", REAL, *HERE)[0] == 0
+    words = ["--member", 2, "--autopilot", "udp:127.0.0.1:39431", "--radio", "udp:127.0.0.1:39432>127.0.0.1:39433"]
+    for early in (0.0, 3600.0, 8 * 86400.0, 400 * 86400.0):
+        with monkeypatch.context() as patched:
+            now = time.time()
+            patched.setattr("airflock.drones.onboard.node_program.time.time", lambda now=now, early=early: now - early)
+            code, _, lines = airflock("fly", "mission.json", *words, "--check")
+        assert code == 0 and ("was the clock set after it had started?" in "\n".join(lines)) is (early > 7 * 86400.0)
+
+
 def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airflock, tmp_path):
     code, _, lines = airflock(
         "fly", "prepare", REAL, "--site", "47.5;19", "--members", "a-3", "--out", "absent/m.txt", "--set", "agents"

@@ -803,3 +803,29 @@ def test_folders_that_do_not_part_files_of_one_name_are_a_question(tmp_path):
     assert "1 is also in" in refused(files, same_clock=True) and "give each a folder" in refused(files, same_clock=True)
     circle(5).to_csv(tmp_path / "a.csv", index=False)  # whose name is that of a folder
     assert "give each a folder" in refused([files[0], files[2], tmp_path / "a.csv"], same_clock=True)
+
+
+@pytest.mark.parametrize("mistake", ["none", "units", "direction", "zero", "still"])
+def test_one_velocity_of_all_is_compared_with_where_they_go(seed, mistake):
+    """Drones that all fly straight have no correlation to look at; it was said that nothing moves."""
+    rng = np.random.default_rng(seed)
+    for _ in range(10):
+        vx, vy = rng.uniform(0.5, 5.0, 2) * rng.choice([-1.0, 1.0], 2)
+        t = np.arange(200) / RATE
+        said = {"units": (100.0 * vx, 100.0 * vy), "direction": (-vx, vy), "zero": (0.0, 0.0)}.get(mistake, (vx, vy))
+        went = (0.0, 0.0) if mistake == "still" else (vx, vy)
+        said = (0.0, 0.0) if mistake == "still" else said
+        table = pd.concat(
+            pd.DataFrame(
+                {"t": t, "id": f"d{k}", "x": 5.0 * k + went[0] * t, "y": went[1] * t, "vx": said[0], "vy": said[1]}
+            )
+            for k in range(3)
+        )
+        if mistake in ("none", "still"):
+            found = airflock.load_tracks(table)
+            assert ("nothing moves" in found.attrs["airflock_import"]) is (mistake == "still")
+            assert np.allclose(values(found)[-1, :, 0] - values(found)[0, :, 0], (t[-1] * went[0], t[-1] * went[1]))
+        else:
+            line = refused(table)
+            assert "column x, row" in line and "say [" in line and "--accept axes" in line
+            assert airflock.load_tracks(table, accept=["axes"]).sizes["individual"] == 3

@@ -23,7 +23,7 @@ from typing import Any
 import airflock
 from airflock.engine.never_collected import frozen_imports
 from airflock.engine.numba_private import is_tested
-from airflock.support import DRIVERS, atomic, cache_folder, private_folder, shrink, toolchain_versions
+from airflock.support import DRIVERS, AirflockError, atomic, cache_folder, private_folder, shrink, toolchain_versions
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 
@@ -64,6 +64,13 @@ def _import_compiler() -> None:
 
                 if is_tested():
                     from airflock.engine.numba_private import sealed_cache  # noqa: F401
+        from numba import config
+
+        if config.DISABLE_JIT:
+            raise AirflockError(
+                "NUMBA_DISABLE_JIT is set, so Numba compiles nothing: unset it, or fly with --device python "
+                "(in Python: device='python')"
+            )
 
 
 def _import(name: str, digest: str, text: str, label: str, by_process: bool) -> ModuleType:

@@ -276,6 +276,7 @@ COMMAND_EXAMPLE = """example:
 
 The first radio sends every safety.status_period, the others every safety.slow_period; what arrives by several counts
 once. A person with a transmitter must be able to take over each drone at any time."""
+LONGEST_CARD, NEVER = 604_800.0, 2**32  # s
 SAVE_PERIOD = 1.0  # s between two writes of what outlives a restart
 
 
@@ -337,6 +338,13 @@ def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, l
         if time.time() >= card.expires:
             errors.append(
                 f"{arguments.card}: expired at {time.strftime('%Y-%m-%d %H:%M UTC', time.gmtime(card.expires))}"
+            )
+        # `fly prepare` writes cards for a week at most; those of fleets in software never expire.
+        if time.time() + LONGEST_CARD < card.expires < NEVER:
+            now, end = (time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime(t)) for t in (time.time(), card.expires))
+            sys.stderr.write(
+                f"airflock: note: this computer's clock says {now}, and {arguments.card} is valid until {end}, more "
+                "than a week later: was the clock set after it had started?\n"
             )
     with collect_errors(errors):
         key = read_key(arguments.key or arguments.card.with_suffix(".key"))

@@ -518,8 +518,17 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
     track : the first of its file, for names in messages
     moved, summed : displacements, and the same from the velocities, (pair, axis), m
     """
-    if summed.std(axis=0).max() <= 1e-12:
-        findings.notes.append(f"{source}: nothing moves: axes and units cannot be checked against velocities")
+    if summed.std(axis=0).max() <= 1e-9 * max(np.abs(summed).max(), 1e-3):
+        # Of one velocity there is no correlation, but its size and direction can be compared.
+        went, said = (np.array2string(each.mean(axis=0), precision=3) for each in (moved, summed))
+        if np.abs(summed).max() <= 1e-12 and np.abs(moved).max() <= 1e-12:
+            findings.notes.append(f"{source}: nothing moves: axes and units cannot be checked against velocities")
+        elif np.abs(summed - moved).mean() > TOLERANCE * np.abs(summed).max():
+            findings.add_error(
+                f"{source}: column {track.label('x')}, row {track.rows[0]} on: in the mean positions go {went} m where "
+                f"velocities, which are all the same, say {said} m: axes or units differ",
+                "axes",
+            )
         return
     likeness = _likeness(moved, summed)
     lively, r, slopes = likeness
