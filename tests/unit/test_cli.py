@@ -248,3 +248,16 @@ main()
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout.splitlines()[-1]) > 1000
+
+
+def test_presets_shows_scenarios_that_load_and_nothing_else_of_this_computer(tmp_path):
+    """A name may be a link to any file, and a scenario may hold letters that turn a terminal's text round."""
+    (tmp_path / "link.toml").symlink_to("/etc/passwd")
+    (tmp_path / "secrets.toml").write_text('[keys]\ntoken = "x0x0x0"\n')
+    (tmp_path / "odd.toml").write_text('extends = "vasarhelyi_2018/4ms"\ntitle = "a\u202eb\té"  # \u2066\n')
+    for name in ("/etc/passwd", tmp_path / "link.toml", tmp_path / "secrets.toml", "/dev/null", tmp_path):
+        done = called("presets", name)
+        assert (done.returncode, done.stdout) == (2, "") and "x0x0" not in done.stderr, done.stderr
+        assert done.stderr.startswith("airflock: ") and "root:" not in done.stderr
+    done = called("presets", tmp_path / "odd.toml")
+    assert done.stdout == 'extends = "vasarhelyi_2018/4ms"\ntitle = "a\\u202eb\té"  # \\u2066\n'

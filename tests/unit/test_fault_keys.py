@@ -5,6 +5,7 @@ import pytest
 
 import airflock
 from airflock.engine import fly_world
+from airflock.scenarios import fault_entries
 from airflock.scenarios.files import load
 from airflock.support.errors import ScenarioError
 
@@ -138,3 +139,13 @@ def test_a_spread_is_named_as_it_is_written():
     groups = [{"name": "all", "model": {"p_rep": {"value": 0.1, "spread": "10 m"}}}]
     (line,) = lines_of({"groups": groups})
     assert line.startswith("groups[0].model.p_rep.spread = 10 m: the unit is 1/s")
+
+
+def test_faults_of_very_many_agents_are_counted_before_their_lists_are_made(monkeypatch):
+    """Fourteen entries of all ten million agents are 929 bytes of text, and were 5 GB of numbers."""
+    made = []
+    monkeypatch.setattr(fault_entries, "_read_agents", lambda *given: made.append(given) or (None, []))
+    many = {"agents": 1e7, "world.side": 1e6, "metrics.kind": "order", "faults": [{"kind": "motor", "at": 1.0}] * 14}
+    with pytest.raises(ScenarioError, match="14 entries of all 10000000 agents are 140,000,000 agents to look at"):
+        airflock.load("vicsek_1995/ordered", many)
+    assert not made

@@ -13,7 +13,7 @@ import imageio.v3 as iio
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib import rcParams
+from matplotlib import pyplot, rcParams
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
@@ -39,7 +39,7 @@ from airflock.view import (
 )
 from airflock.view.law_vectors import vector_fields
 from airflock.view.order_parameter_plots import SmoothedLines, heatmap, rotations, series, transfer
-from airflock.view.result_plots import extrapolated_tail, plot_certificate
+from airflock.view.result_plots import _draw_saturation, extrapolated_tail, plot_certificate
 from airflock.view.rules_plot import alignment_curve, allowed_difference_curve, repulsion_curve, rules, wall_curve
 from airflock.view.style import PictureError, save_figure
 from airflock.view.trajectory_plots import trajectories
@@ -652,3 +652,29 @@ def test_a_certificate_draws_numbers_with_a_factor_and_numbers_from_zero():
     assert sorted(widths) == pytest.approx([-0.5, 0.0, 1.0])
     ends = [line.get_xdata() for line in panel.lines if line.get_color() == "black"]
     assert len(ends) == 1 and ends[0] == pytest.approx([0.8, 1.4])
+
+
+def test_a_certificate_that_counted_nothing_says_so_and_has_no_logarithm_of_it():
+    """A budget of no time looks at no flight: "Data cannot be log-scaled" stood in the report."""
+    empty = SimpleNamespace(rows=(), tolerance={}, over={}, shown=False)
+    empty.campaign = SimpleNamespace(confidence=0.95, scenario=SimpleNamespace(name="mine"))
+    for looks in ([], [take_look(0, 0, 0.05, 0.05)]):
+        limit = SimpleNamespace(event="x", score="r_min", value=1.0)
+        empty.verdicts = (SimpleNamespace(looks=looks, probability=0.1, high=None, limit=limit),)
+        figure = plot_certificate(empty)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            figure.canvas.draw()
+        assert [text.get_text() for text in figure.axes[0].texts][:1] == ["no flight was counted"]
+
+
+def test_an_identified_flight_whose_command_never_stands_still_is_drawn():
+    """No four rows in a row have one command: there is no acceleration to show, and no quantile of it."""
+    count = 200
+    logs = SimpleNamespace(
+        time=0.1 * np.arange(count), is_new=np.arange(count) == 0, step=0.1,
+        command=np.random.default_rng(1).normal(size=(count, 2)), velocity=np.zeros((count, 2)),
+    )  # fmt: skip
+    panel = pyplot.figure().add_subplot()
+    _draw_saturation(panel, logs, SimpleNamespace(body=SimpleNamespace(value={"tau": 1.0, "a_max": 5.0, "white": 0.1})))
+    assert [text.get_text() for text in panel.texts] == ["the command never stands still"]

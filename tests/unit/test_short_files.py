@@ -1,5 +1,7 @@
 """Short scenario files: extends, keys by their last word, notes on what is hardly meant, and the list of all keys."""
 
+import math
+import random
 import re
 
 import pytest
@@ -186,3 +188,39 @@ def test_the_keys_of_a_kind_of_fault_are_its_numbers_and_those_of_every_entry():
 def test_an_unknown_section_of_keys_is_told_with_the_nearest():
     with pytest.raises(ScenarioError, match="did you mean radio.delay"):
         keys.keys("dely")
+
+
+def test_a_number_that_is_refused_or_rounded_is_shown_with_the_digits_that_say_why(seed):
+    """5000000.5 was told as 5e+06, which is a whole number; a duration was rounded without a word."""
+    rng = random.Random(seed)
+    for _ in range(50):
+        whole = rng.randint(1, 10 ** rng.randint(1, 7))
+        agents = whole + rng.choice([0.5, 0.25, 1e-3])
+        with pytest.raises(ScenarioError) as caught:
+            load(NAME, {"agents": agents})
+        (said,) = [line for line in caught.value.faults if line.endswith("is not a whole number")]
+        assert float(said.split()[3]) != round(float(said.split()[3])), said
+        loss = 1.0 + 10.0 ** -rng.randint(1, 15)
+        with pytest.raises(ScenarioError, match="radio.loss = ") as caught:
+            load(NAME, {"radio.loss": loss})
+        assert float(str(caught.value).split("radio.loss = ")[1].split()[0]) > 1.0
+        steps = rng.randint(1, 10**6)
+        duration = 0.01 * (steps + rng.choice([0.0, rng.uniform(0.01, 0.49)]))
+        (note,) = [note for note in load(NAME, {"duration": duration}).notes if note.startswith("duration")] or [""]
+        rounded = abs(duration - 0.01 * steps) > 1e-9
+        assert bool(note) is rounded, (duration, note)
+        if note:
+            shown, to = (float(note.split(" s")[0].split()[-1]), float(note.split("rounded to ")[1].split()[0]))
+            assert shown != to and to == pytest.approx(0.01 * steps, rel=1e-5)
+
+
+@pytest.mark.parametrize("key", ["world.corners", "world.obstacles"])
+def test_a_polygon_of_very_many_corners_is_refused_before_anything_is_made_of_it(key):
+    turns = [2.0 * math.pi * k / 10_001 for k in range(10_001)]
+    ring = [[90.0 * math.cos(a), 90.0 * math.sin(a)] for a in turns]
+    shape = {"world.arena": "polygon", key: ring} if key == "world.corners" else {key: [ring]}
+    with pytest.raises(ScenarioError) as caught:
+        load(NAME, {**shape, "world.walls": "every_edge", "agents": 4})
+    assert [line.partition(": ")[2] for line in caught.value.faults] == [
+        "world.corners and world.obstacles have 10001 corners, more than 10000"
+    ]

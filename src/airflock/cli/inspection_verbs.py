@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from airflock.cli import options, terminal
-from airflock.support import AirflockError, as_error, collect_errors, is_file, read_text
+from airflock.support import AirflockError, as_error, collect_errors, printable, read_text
 
 if TYPE_CHECKING:
     from airflock.scenarios import Key
@@ -37,11 +37,10 @@ def presets(
         _show(starting_set(for_speed), as_json)
         return
     if name is not None:
-        if name not in known and not is_file(name):
-            files.load(name)  # complains about a wrong name
+        files.load(name)  # nothing but a scenario is printed: a name may be a link to any file of this computer
         with as_error(name):
             text = read_text(known.get(name) or name)
-        _show(text, as_json and bool(files.load(name)))  # a file that is none is refused as any other
+        _show(text, as_json)
         return
     titles = {key: str(files.load(key).document.get("title", "")) for key in known}
     if as_json:
@@ -57,7 +56,7 @@ def _show(text: str, as_json: bool) -> None:
     if as_json:
         terminal.print_json(tomllib.loads(text))
     else:
-        typer.echo(text, nl=False)
+        typer.echo("".join(c if c in "\n\t" else printable(c) for c in text), nl=False)
 
 
 def validate(

@@ -81,6 +81,7 @@ from .parameters import (
     points_error as points_error,
     quantity as quantity,
     quantity_error as quantity_error,
+    telling_digits as telling_digits,
     text as text,
     vector_properties as vector_properties,
     vector_sizes as vector_sizes,

@@ -6,7 +6,7 @@ constants in a kernel.
 """
 
 import inspect
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import cache
 from math import isfinite
@@ -375,8 +375,17 @@ def quantity_error(value: Any, declared: Quantity) -> str:
     if not isinstance(value, float):
         return f"= {value!r} is not a number; give {declared.span}"
     if not declared.low <= value <= declared.high:
-        return f"= {format_with_unit(f'{value:g}', declared.unit)} lies outside {declared.span}"
-    return f"= {value:g} is not a whole number" if declared.whole and value != int(value) else ""
+        text = telling_digits(value, lambda v: not declared.low <= v <= declared.high)
+        return f"= {format_with_unit(text, declared.unit)} lies outside {declared.span}"
+    if declared.whole and value != int(value):
+        return f"= {telling_digits(value, lambda v: v != int(v))} is not a whole number"
+    return ""
+
+
+def telling_digits(value: float, is_wrong: Callable[[float], bool]) -> str:
+    """Format a number with as many digits as show what is wrong with it, six at least."""
+    texts = (f"{value:.{digits}g}" for digits in (6, 9, 12, 15))
+    return next((text for text in texts if is_wrong(float(text))), repr(value))
 
 
 def choice_error(value: Any, declared: Choice) -> str:

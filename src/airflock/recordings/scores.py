@@ -265,7 +265,7 @@ def measure_recording(
     scores |= {} if present.all() else {"present": float(present.mean())}
     bridged = (recording["confidence"] == 0.5) if "confidence" in recording else np.zeros(())
     scores |= {"present_measured": float(present.mean() - bridged.mean())} if bridged.any() else {}
-    undefined = undefined_metrics_of(recording, scenario, settings)
+    undefined = {*undefined_metrics_of(recording, scenario, settings), *scenario.unmeasured}
     kept = {name: value for name, value in scores.items() if name not in undefined}
     return kept, course[[name for name in course if name not in undefined]]
 

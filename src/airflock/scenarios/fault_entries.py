@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # Refused where agents update in turn: they see each other as they are, so no message exists that a
 # fault could disturb.
 PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
+MOST_AFFECTED = 10_000_000  # agents of all entries that name none: 3 GB of onsets, drawn in half a minute
 MOST = 255  # entries of a file: each draws by a number of its own
 
 
@@ -85,6 +86,12 @@ def read_fault_entries(
         return (), [], ["faults is not a list of tables; write [[faults]]"]
     if len(tables) > MOST:
         return (), [], [f"faults: {len(tables)} entries are more than {MOST}"]
+    wide = sum(not {"agents", "group"} & set(table) for table in tables)
+    if wide * agents > MOST_AFFECTED:  # each would have a list of all, and all of them draw
+        return (), [], [
+            f"faults: {wide} entries of all {agents} agents are {wide * agents:,} agents to look at, more than "
+            f"{MOST_AFFECTED:,}; write which agents each may hit (agents or group), or fewer entries"
+        ]  # fmt: skip
     entries: list[FaultEntry] = []
     notes: list[str] = []
     errors: list[str] = []

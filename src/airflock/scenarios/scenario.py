@@ -1,5 +1,6 @@
 """Scenario: model, body, radio, sensors, world, number of agents, duration and sampling; frozen data."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -320,7 +321,14 @@ class Scenario:
 
     def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Add the fitness of the metric set and its parts to the order parameters of a flight."""
-        return self.metrics.rule.judged(values, self.agents, self.flight.duration, self.resolved_metrics())
+        found = self.metrics.rule.judged(values, self.agents, self.flight.duration, self.resolved_metrics())
+        return found | dict.fromkeys(self.unmeasured & set(found), math.nan)
+
+    @property
+    def unmeasured(self) -> set[str]:
+        """Names of order parameters that need metrics.max_e, where neither it nor an arena says how large that is."""
+        known = self.metrics.numbers.max_e is not None or largest_extension(self.world)
+        return set() if known else {"cns_ext", "quality", "cns_ext_groups", "quality_groups"}
 
     def resolved_silence(self) -> SilenceParameters:
         """Return the rule of silence, open numbers derived from the rest of the scenario."""
@@ -424,7 +432,7 @@ def default_metrics(scenario: Scenario) -> MetricParameters:
     if numbers["collision_period"] is None:
         numbers["collision_period"] = scenario.flight.dt
     if numbers["max_e"] is None:
-        numbers["max_e"] = largest_extension(scenario.world) or None
+        numbers["max_e"] = largest_extension(scenario.world) or 1e7  # m, the largest; then `unmeasured`
     if numbers["k"] is None:
         numbers["k"] = numbers["max_e"]
     return type(scenario.metrics.numbers)(**numbers)

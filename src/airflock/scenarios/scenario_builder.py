@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.core import Model
+from airflock.core import Model, telling_digits
 from airflock.scenarios import formats, schema, short_keys
 from airflock.scenarios.fault_entries import read_fault_entries
 from airflock.scenarios.flight_world import scene_errors, scene_notes
@@ -124,6 +124,9 @@ def build_scenario(
     return replace(scenario, notes=notes)
 
 
+MOST_CORNERS = 10_000  # of all polygons of a world: each is looked at in each decision
+
+
 def _in_si_units(
     document: dict[str, Any], settings: Mapping[str, Any], short: Mapping[str, Any], records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
@@ -212,12 +215,16 @@ def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: boo
     errors: list[str] = []
     flight, law, world = parts["flight"], flown.law, parts["world"]
     if flight is not None and flight.agents != int(flight.agents):
-        errors.append(f"agents = {flight.agents:g} is not a whole number")
+        errors.append(f"agents = {telling_digits(flight.agents, lambda v: v != int(v))} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
     ours = parts["topology"] is not None and flown.topology is None
     meets = TOPOLOGY_KIND.shipped[parts["topology"].kind] if ours else flown.topology
     errors += topology_errors(meets, world, law)
     errors += field_file_errors(world)
+    corners = 0 if world is None else len(world.corners) + sum(map(len, world.obstacles))
+    if corners > MOST_CORNERS:  # before anything is made of them
+        errors.append(f"world.corners and world.obstacles have {corners} corners, more than {MOST_CORNERS}")
+        world = None
     if world is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0
         if separation is None and law is not None and parts.get("parameters") is not None:

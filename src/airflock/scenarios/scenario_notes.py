@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from airflock.core import CLOCKS, Metric, Quantity, declarations
+from airflock.core import CLOCKS, Metric, Quantity, declarations, telling_digits
 from airflock.parts.metrics import METRICS
 from airflock.scenarios.cost import cell_notes, metrics_use_cells, uses_all_cores
 from airflock.scenarios.scenario import Scenario
@@ -24,6 +24,11 @@ def setting_notes(scenario: Scenario) -> list[str]:
     cells = uses_all_cores(scenario) and metrics_use_cells(scenario)
     notes = pair_notes(scenario.flight, scenario.metrics.numbers, scenario.order_parameters, cells)
     notes += timing_notes(scenario) + wing_notes(scenario) + cell_notes(scenario)
+    if nan := scenario.unmeasured & {name for item in scenario.order_parameters for name in item.Sample._fields}:
+        notes.append(
+            f"metrics.max_e is missing: without an arena the largest extension is unknown, so {', '.join(sorted(nan))} "
+            "are nan; give metrics.max_e in m"
+        )
     p = scenario.parameters
     body, duration = scenario.body.numbers, scenario.flight.duration
     if getattr(body, "battery", "endless") == "lithium" and getattr(body, "hover_power", 0.0) > 0.0:
@@ -186,6 +191,7 @@ def timing_notes(scenario: Scenario) -> list[str]:
     """Note times that are rounded to steps."""
     notes, dt = [], scenario.flight.dt
     times = {
+        "duration": scenario.flight.duration,
         "sensors.period": scenario.sensors.period,
         "radio.delay": scenario.radio.delay,
         "metrics.period": scenario.metrics.period,
@@ -194,7 +200,9 @@ def timing_notes(scenario: Scenario) -> list[str]:
     for key, value in times.items():
         steps = round(value / dt)
         if abs(steps * dt - value) > 1e-9 * max(value, dt):
-            notes.append(f"{key} = {value:g} s is rounded to {steps * dt:g} s, {steps} steps of dt = {dt:g} s")
+            rounded = f"{steps * dt:g}"
+            text = telling_digits(value, float(rounded).__ne__)
+            notes.append(f"{key} = {text} s is rounded to {rounded} s, {steps} steps of dt = {dt:g} s")
     period, delay = scenario.sensors.period, scenario.radio.delay
     if period > 0.0 and abs(delay / period - round(delay / period)) > 1e-9:
         notes.append(

@@ -19,6 +19,7 @@ from airflock.core import (
     format_with_unit,
     points_error,
     quantity_error,
+    telling_digits,
 )
 from airflock.support import suggest
 
@@ -121,9 +122,10 @@ def _line(name: str, value: Any, declared: Declaration) -> str:
     """Return the error line for a value that is not what was declared."""
     if isinstance(declared, Quantity):
         if isinstance(value, float) and isfinite(value) and declared.whole and not value.is_integer():
-            return f"{name} = {value:g} is not a whole number; give one in {declared.span}"
+            text = telling_digits(value, lambda v: v != int(v))
+            return f"{name} = {text} is not a whole number; give one in {declared.span}"
         if isinstance(value, Real) and not isinstance(value, bool):
-            return f"{name} = {format_with_unit(_number(value), declared.unit)} lies outside {declared.span}"
+            return f"{name} = {format_with_unit(_number(value, declared), declared.unit)} lies outside {declared.span}"
         return f"{name} = {value!r} is not a number; give {declared.span}"
     if isinstance(declared, Choice):
         hint = suggest(value, declared.options, lead="; ", cutoff=0.6)
@@ -142,9 +144,9 @@ def _line(name: str, value: Any, declared: Declaration) -> str:
     return f"{name} is not {what} in {declared.unit}"
 
 
-def _number(value: Real) -> str:
+def _number(value: Real, declared: Quantity) -> str:
     """Format a number for a person; a whole number may be too large to be a float."""
     try:
-        return f"{value:g}"
+        return telling_digits(float(value), lambda v: not declared.low <= v <= declared.high)
     except OverflowError:
         return "a whole number beyond 1e308"

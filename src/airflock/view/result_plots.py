@@ -49,6 +49,9 @@ def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> F
 
 def _bounds(axes: Axes, certificate: "Certificate") -> None:
     """Draw the upper and lower bound of every limit at every look, and the limit itself."""
+    if not any(look.flights for verdict in certificate.verdicts for look in verdict.looks):
+        _empty(axes, "no flight was counted")  # a budget of no time: there is nothing on logarithmic axes
+        return
     for verdict, color in zip(certificate.verdicts, style.LINE_COLOURS, strict=False):
         if verdict.looks:
             n = [look.flights for look in verdict.looks]
@@ -177,6 +180,7 @@ def _bound_map(axes: Axes, certificate: "Certificate") -> None:
 
 MAX_SECONDS = 20.0  # s of one drone in the first panel
 MAX_POINTS = 4000  # points in the second
+FEW = 20  # of them, with which the panel says nothing
 
 
 def plot_identified(result: IdentifyResult, check: LogCheck | None = None, *, ax: Axes | None = None) -> Figure:
@@ -240,6 +244,9 @@ def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> N
     k = np.arange(len(run) - 3)
     k = k[(run[k] == run[k + 3]) & (np.abs(logs.command[k + 2] - logs.command[k]).max(axis=1) < 1e-9)]
     k = k[:: max(1, len(k) // MAX_POINTS)]
+    if len(k) < FEW:
+        _empty(panel, "the command never stands still")
+        return
     # four rows: the outer two give the gap, the inner two the acceleration, so that no noise of the
     # log is in both
     gap = logs.command[k] - 0.5 * (logs.velocity[k] + logs.velocity[k + 3])
@@ -315,6 +322,9 @@ def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
         if len(k) > 30:
             lags.append(lag * step)
             seen.append(0.5 * float(((ground.velocity[k + lag] - ground.velocity[k]) ** 2).mean()))
+    if not lags:
+        _empty(panel, "no drone stood long enough on the ground")
+        return
     spring = np.sqrt(2.0 * value["damping"] * value["noise"]) / value["scale"]
     line = np.geomspace(step, max(lags), 80)
     # stationary covariance of the velocity of a damped oscillator, as sensors.langevin draws it

@@ -101,12 +101,10 @@ def total(over_time):
 def errors(q, largest, edges):
     """Return the errors of the parameters of the set beyond single ranges; largest: extension of the arena, m."""
     most = q.max_e if q.max_e is not None else largest
-    if not most:
-        return ["metrics.max_e is missing: without an arena the largest extension is unknown; give metrics.max_e in m"]
     found = []
     if q.count == "program" and edges == "periodic":
         found.append("metrics.count = 'program': the program knows no periodic box (world.edges); count each")
-    if q.k is not None and q.k > most * (1.0 + 1e-9):
+    if q.k is not None and most and q.k > most * (1.0 + 1e-9):
         found.append(f"metrics.k = {q.k:g} m lies outside [0, {most:g}] m, the largest extension metrics.max_e")
     if abs(q.sigma + q.gamma - 1.0) > 1e-9:
         found.append(f"metrics.sigma + metrics.gamma = {q.sigma + q.gamma:g} is not 1")
