@@ -446,5 +446,5 @@ def test_polygons_that_cross_are_one_line_each_and_no_warning_of_a_library(tmp_p
             try:
                 load_field(written(tmp_path, *map(polygon, rings)))
             except ScenarioError as error:
-                lines = error.faults
+                lines = error.errors
             assert all(" crosses or touches itself " in line or " outside feature " in line for line in lines), lines

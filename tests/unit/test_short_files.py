@@ -198,7 +198,7 @@ def test_a_number_that_is_refused_or_rounded_is_shown_with_the_digits_that_say_w
         agents = whole + rng.choice([0.5, 0.25, 1e-3])
         with pytest.raises(ScenarioError) as caught:
             load(NAME, {"agents": agents})
-        (said,) = [line for line in caught.value.faults if line.endswith("is not a whole number")]
+        (said,) = [line for line in caught.value.errors if line.endswith("is not a whole number")]
         assert float(said.split()[3]) != round(float(said.split()[3])), said
         loss = 1.0 + 10.0 ** -rng.randint(1, 15)
         with pytest.raises(ScenarioError, match="radio.loss = ") as caught:
@@ -221,6 +221,6 @@ def test_a_polygon_of_very_many_corners_is_refused_before_anything_is_made_of_it
     shape = {"world.arena": "polygon", key: ring} if key == "world.corners" else {key: [ring]}
     with pytest.raises(ScenarioError) as caught:
         load(NAME, {**shape, "world.walls": "every_edge", "agents": 4})
-    assert [line.partition(": ")[2] for line in caught.value.faults] == [
+    assert [line.partition(": ")[2] for line in caught.value.errors] == [
         "world.corners and world.obstacles have 10001 corners, more than 10000"
     ]
