@@ -12,6 +12,7 @@ import pytest
 from shapely.geometry import Point, Polygon, box
 
 import airflock
+from airflock.certificates.campaign import scenario_identity
 from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.scenarios import scenario_checks
 from airflock.scenarios.files import load
@@ -448,3 +449,9 @@ def test_polygons_that_cross_are_one_line_each_and_no_warning_of_a_library(tmp_p
             except ScenarioError as error:
                 lines = error.errors
             assert all(" crosses or touches itself " in line or " outside feature " in line for line in lines), lines
+
+
+def test_a_place_decides_no_flight_and_so_no_certificate():
+    place = {"world.latitude": 47.0, "world.longitude": 19.0}
+    here, nowhere = (airflock.load("vasarhelyi_2018/4ms", keys) for keys in (place, {}))
+    assert scenario_identity(here) == scenario_identity(nowhere) and here.world != nowhere.world

@@ -390,6 +390,9 @@ def scenario_identity(scenario: Scenario) -> str:
     }
     stands = hashlib.sha256(scenario.stands().shapes.tobytes()).hexdigest() if scenario.scene.draw == "once" else ""
     document["scene"] = {**document["scene"], "file": "", "stands": stands}
+    if scenario.scene.up == "standard":  # which is z but in glTF, and what stands is in the hash
+        document["scene"]["up"] = "z"
+    document["world"] = {k: v for k, v in document["world"].items() if k not in ("latitude", "longitude")}
     if not document["start"]["wall_clearance"]:  # as in flights from before there was one
         del document["start"]["wall_clearance"]
     document["laws"] = [scenario.model.name, scenario.body.rule.name]

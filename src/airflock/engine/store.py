@@ -66,7 +66,7 @@ def _import_compiler() -> None:
                     from airflock.engine.numba_private import sealed_cache  # noqa: F401
         from numba import config
 
-        if config.DISABLE_JIT:
+        if config.DISABLE_JIT:  # type: ignore[attr-defined]
             raise AirflockError(
                 "NUMBA_DISABLE_JIT is set, so Numba compiles nothing: unset it, or fly with --device python "
                 "(in Python: device='python')"
