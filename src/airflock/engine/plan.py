@@ -471,7 +471,8 @@ def plan_of(
 def _own_text(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> Hashable:
     """State of the text of a scenario's rules that are the user's own: a notebook changes what they refer to."""
     models = [model for law in scenario.laws for model in (law.model, law.model.added) if model is not None]
-    kinds = scenario.vehicle, scenario.sensor, scenario.transceiver, scenario.own_topology, *scenario.fault_kinds
+    parts = scenario.body, scenario.sensors, scenario.radio, scenario.topology
+    kinds = *(part.rule for part in parts), *scenario.fault_kinds
     measures = scenario.order_parameters if metrics is None else metrics
     return text_state(rule for part in (*models, *kinds, *measures) if part for rule in vars(part).values())
 
