@@ -37,7 +37,7 @@ SCALES = {
     "chen_2014": (3.0, "r_hunt", 1.0), "couzin_2005": (6.0, "rho", 1.0),
 }  # fmt: skip
 BODIES = {
-    "velocity": ("multirotor", "quadrotor", "fixed_wing", "direct", "jostled"),
+    "velocity": ("multirotor", "quadrotor", "fixed_wing", "direct", "jostled", "autopilot"),
     "acceleration": ("steered",), "heading": ("heading",),
 }  # fmt: skip
 CUBE = str(Path(__file__).parent / "cube.obj")
@@ -116,6 +116,10 @@ def settings(rng: Random) -> tuple[dict[str, Any], NDArray[np.float64] | None]:
     groups(keys, rng, kind)
     faults(keys, rng, length)
     silence(keys, rng, kind, length, dt)
+    if keys["update"] == "synchronous":  # commands wait less than a decision, some decisions, or not at all
+        keys["body.delay"] = dt * (0, 1, 7)[rng.randrange(2**32) % 3]
+    else:
+        keys["body.delay"] = 0.0
     return keys, start
 
 
@@ -218,7 +222,7 @@ def model(keys: dict[str, Any], rng: Random, kind: str) -> None:
     if body in ("multirotor", "jostled") and rng.random() < 0.5:
         keys["body.noise"] = 0.0
     elif rng.random() < 0.5:
-        sometimes(keys, rng, KNOWN_BODIES[body].Parameters, "body", 0.4)
+        sometimes(keys, rng, KNOWN_BODIES[body].Parameters, "body", 0.4, ("delay",))
     if body == "fixed_wing":
         keys["wing.weight"] = 0.02 * SCALES[kind][2] ** 2  # N; it stalls at a quarter of the law's speed
     if kind != "dimock_2003" and law.command == "velocity" and rng.random() < 0.12:
@@ -449,7 +453,7 @@ CHOICES = [f"faults.kind = {kind}" for kind in KINDS]
 CHOICES += [f"{owner}.{name} = {x}" for owner, names in OPTIONS.items() for name, xs in names.items() for x in xs]
 SWITCHES = (
     "three", "noisy", "late", "lossy", "links", "gusts", "periodic", "islands", "scene", "goals", "own", "sequential",
-    "stop", "descends", "given", "sees", "walls", "groups", "laws", "faults", "absent", "silent",
+    "stop", "descends", "given", "sees", "walls", "groups", "laws", "faults", "absent", "silent", "waits",
 )  # fmt: skip
 
 
@@ -466,6 +470,7 @@ def notions(draw: Draw) -> set[str]:
         "sees": found.model.sight is not None, "walls": found.model.boundary is not None,
         "groups": bool(found.groups), "laws": len(found.laws) > 1, "faults": bool(found.fault_kinds),
         "absent": any(kind.leaves for kind in found.fault_kinds), "silent": found.silence.rule == "stop",
+        "waits": found.body.delay > 0.0,
     }  # fmt: skip
     assert tuple(switches) == SWITCHES
     kinds = {f"faults.kind = {kind.name}" for kind in found.fault_kinds}
@@ -490,6 +495,7 @@ IMPOSSIBLE = (
     {"periodic on", "islands on"},
     {"sequential on", "noisy on"}, {"sequential on", "late on"}, {"sequential on", "lossy on"},
     {"sequential on", "links on"}, {"descends on", "sequential on"},
+    {"sequential on", "waits on"},
     {"sees on", "walls on"}, {"descends on", "sees on"}, {"silent on", "sequential on"}, {"silent on", "descends on"},
 )  # fmt: skip
 

@@ -587,6 +587,7 @@ def test_a_group_may_be_a_share_of_any_flock(agents, few):
         ),
         ([{"body": {"kind": "direct"}}], "one body carries all; only numbers differ from group to group"),
         ([{"bodies": {}}], r"groups\[0\].bodies: unknown key"),
+        ([{"body": {"delay": 0.4}}], "all bodies follow their commands after one dead time; set body.delay"),
         ([{"sensors": {"period": 1.0}}], "all measure and decide at the same times"),
         ([{"sensors": {"kind": "gnss"}}], "all measure by one sensor; only numbers differ from group to group"),
         ({"a": 1}, "groups is not a list of tables"),

@@ -254,6 +254,47 @@ def test_after_a_change_of_the_delay_states_of_so_long_ago_are_heard(delay, devi
         flight.advance(steps=20)
 
 
+@pytest.mark.parametrize(("device", "precision"), [("python", 64), ("cpu", 32), ("cpu", 64)])
+def test_commands_that_wait_belong_to_the_flight(device, precision):
+    """In parts, gone back, branched, overruled by what was decided anyway, and set to the same dead time again."""
+    keys = {"agents": 6, "duration": 5.0, "dt": 0.05, "body.delay": 0.35}
+    late = load("vasarhelyi_2018/4ms", keys | {"sensors.period": 0.1})
+
+    def opened():
+        return airflock.open(late, 5, device=device, precision=precision)
+
+    straight, flight = opened().advance(5.0), opened().advance(1.65)
+    moment = flight.snapshot()
+    twin = flight.branch().advance(3.35)
+    changed = opened().advance(1.65).change({"body.delay": 0.35}).advance(3.35)
+    again = flight.advance(2.0).restore(moment).advance(1.0).advance(2.35)
+    told = opened()
+    while told.time < 5.0 - 1e-6:
+        told.sense().command([0, 3], told.commands[:, [0, 3]].T).advance(steps=2)
+    for each in (twin, again, told, changed):
+        assert np.array_equal(each.state, straight.state)
+
+
+@pytest.mark.parametrize("device", ["python", "cpu"])
+@pytest.mark.parametrize(("before", "after"), [(0.0, 0.4), (0.3, 0.1), (0.1, 0.5), (0.4, 0.0)])
+def test_after_a_change_of_the_dead_time_commands_of_so_long_ago_are_followed(device, before, after):
+    """Of a body that is where its command says at once: its velocities are the commands of a dead time ago."""
+    keys = {"agents": 4, "duration": 6.0, "dt": 0.05, "sensors.period": 0.1, "sensors.noise": 0.0}
+    late = load("vasarhelyi_2018/4ms", keys | {"body.kind": "direct", "body.delay": before})
+    flight, told = airflock.open(late, 5, device=device, precision=64), []
+    for step in range(0, 80, 2):
+        if step == 40:
+            flight.change({"body.delay": after})
+        told.append(flight.sense().commands)
+        flight.advance(steps=1)
+        lag = round((after if step >= 40 else before) / 0.1)
+        if len(told) > lag and not 40 <= step < 40 + 2 * lag:
+            np.testing.assert_allclose(flight.state[2:], told[-1 - lag], atol=1e-12)
+        elif step >= 40 and after > before:  # the oldest that is known meanwhile
+            np.testing.assert_allclose(flight.state[2:], told[20 - round(before / 0.1) - 1], atol=1e-12)
+        flight.advance(steps=1)
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_wider_collision_distance_misses_no_contact(seed):
     """The bound on how near pairs can have come was found for the old distance."""

@@ -5,11 +5,14 @@ import math
 import numpy as np
 import pytest
 
+import airflock
 from airflock.core import random
-from airflock.parts.bodies import jostled, motion, wind
+from airflock.parts.bodies import autopilot, jostled, motion, wind
+from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.sensors import langevin
 from airflock.scenarios.files import load
 from airflock.scenarios.flight_world import FlightWorld
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.world import start
 from flocks import flown, from_start, ideal, scenario
 from reference.begin import begin
@@ -151,3 +154,83 @@ def test_all_directions_are_equally_likely_at_the_start(seed):
     np.testing.assert_allclose(np.linalg.norm(v, axis=1), 3.0, rtol=1e-9)
     share = np.sort((v / 3.0 + 1.0) / 2.0, axis=0)  # a coordinate of a point on a sphere is uniform (Archimedes)
     assert np.abs(share - (np.arange(n)[:, None] + 0.5) / n).max() < 2.2 / math.sqrt(n)  # Kolmogorov: p below 1e-4
+
+
+OWN_BODY = """ACCEPTS, INTEGRATION = "velocity", "new"
+
+
+def move(vx, vy, vz, cx, cy, cz, dt):
+    k = 2.0 * dt
+    return vx + k * (cx - vx), vy + k * (cy - vy), vz + k * (cz - vz)
+"""
+STILL = {
+    "agents": 2, "sensors.noise": 0.0, "radio.delay": 0.0, "start.speed": 0.0, "start.separation": 20.0, "dt": 0.02,
+    "world.side": 1000.0, "duration": 6.0, "metrics.period": 0.02,
+}  # fmt: skip
+LAWS = {"velocity": "vasarhelyi_2018", "acceleration": "reynolds_1987", "heading": "vicsek_1995"}
+
+
+def commanded(kind, delay, every, commands):
+    """Velocities at every step (step, component, agent) of agents that are commanded so, one row a decision."""
+    law = LAWS[BODIES[kind].accepts] if kind in BODIES else LAWS["velocity"]
+    quiet = {"body.noise": 0.0} if kind in ("multirotor", "jostled", "autopilot") else {}
+    keys = STILL | quiet | {"body.kind": kind, "body.delay": delay * 0.02, "sensors.period": every * 0.02}
+    keys |= {"start.speed": 15.0, "model.v_flock": 15.0} if kind == "fixed_wing" else {}
+    found = build_scenario({"model": {"kind": law}}, "waiting", keys, trust=True)
+    flight = airflock.open(found, 1, device="python", precision=64, record=True)
+    for command in commands:
+        flight.command([0, 1], command).advance(steps=every)
+    return flight.frames[:, 2:4]
+
+
+@pytest.mark.parametrize("kind", [*BODIES, "own"])
+def test_commands_that_wait_move_any_body_as_they_would_have_moved_it_earlier(kind, seed, tmp_path):
+    """Of commands that do not depend on the motion: the flight, by a dead time of any number of steps later."""
+    if kind == "own":
+        kind = str(tmp_path / "mine.py")
+        (tmp_path / "mine.py").write_text(OWN_BODY)
+    rng = np.random.default_rng(seed)
+    speed = 15.0 if kind == "fixed_wing" else 4.0
+    turns = np.cumsum(rng.uniform(-0.3, 0.3, (30, 2)), axis=0)
+    commands = np.stack([np.cos(turns), np.sin(turns)], axis=2)
+    commands *= 1.0 if kind in BODIES and BODIES[kind].accepts == "heading" else speed
+    for _ in range(3):
+        delay, every = int(rng.integers(1, 12)), int(rng.integers(1, 5))
+        at_once, late = commanded(kind, 0, every, commands), commanded(kind, delay, every, commands)
+        if kind == "fixed_wing":  # which flies on as it started meanwhile, and so is elsewhere in its own dynamics
+            steady = commanded(kind, 0, every, np.repeat(late[0].T[None], 30, axis=0))
+            np.testing.assert_allclose(late[: delay + 1], steady[: delay + 1], atol=1e-12)
+        else:
+            np.testing.assert_allclose(late[: delay + 1], np.broadcast_to(late[0], late[: delay + 1].shape), atol=1e-12)
+            np.testing.assert_allclose(late[delay:], at_once[:-delay], rtol=0.0, atol=1e-12)
+        assert np.abs(late[delay + 1 :] - late[0]).max() > 0.01
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.02, 0.3, 0.4])
+def test_a_step_command_arrives_after_exactly_the_dead_time(delay):
+    moved = commanded("direct", round(delay / 0.02), 5, np.full((8, 2, 2), 3.0))[:, 0, 0]
+    np.testing.assert_array_equal(moved, np.where(np.arange(len(moved)) > round(delay / 0.02), 3.0, 0.0))
+
+
+def test_an_autopilot_answers_a_step_within_its_acceleration_and_its_jerk_and_then_with_its_lag(seed):
+    """From rest: a ramp of the acceleration, its limit, and an exponential with tau."""
+    rng, dt = np.random.default_rng(seed), 0.005
+    for _ in range(5):
+        tau, a_max, jerk = rng.uniform(0.4, 1.5), rng.uniform(1.0, 5.0), rng.uniform(5.0, 30.0)
+        b = autopilot.Parameters(tau=tau, a_max=a_max, jerk=jerk, noise=0.0)
+        c = rng.normal(size=3)
+        c *= (2.0 * a_max * tau + a_max**2 / jerk) / np.linalg.norm(c)  # far beyond the limit of the acceleration
+        v, memory, speeds, pushes = np.zeros(3), autopilot.Memory(), [0.0], [np.zeros(3)]
+        for _ in range(round(10.0 * tau / dt)):
+            *v, memory = autopilot.move(*v, *v, *c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, memory, dt, b)
+            speeds.append(float(np.linalg.norm(v)))
+            pushes.append(np.array(memory))
+        felt = np.linalg.norm(pushes, axis=1)
+        assert felt.max() == pytest.approx(a_max, rel=1e-9)
+        assert np.linalg.norm(np.diff(pushes, axis=0), axis=1).max() <= jerk * dt * (1.0 + 1e-9)
+        ramp = round(a_max / jerk / dt) - 1  # v = jerk t² / 2
+        assert speeds[ramp] == pytest.approx(0.5 * jerk * (ramp * dt) ** 2, rel=0.1)
+        gap = np.linalg.norm(c) - np.array(speeds)
+        late = int(np.argmax(gap < 0.3 * a_max * tau))
+        assert gap[late + round(tau / dt)] / gap[late] == pytest.approx(math.exp(-1.0), rel=0.02)
+        assert np.diff(speeds).min() >= -1e-12  # it does not overshoot

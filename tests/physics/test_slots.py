@@ -23,8 +23,10 @@ DRONES = {
 }  # fmt: skip
 
 
-def test_agents_of_a_grid_fly_and_are_recorded_as_those_of_all_pairs(seed):
-    found = load(DISPLAY, DRONES)
+@pytest.mark.parametrize("delay", [0.0, 0.25])
+def test_agents_of_a_grid_fly_and_are_recorded_as_those_of_all_pairs(delay, seed):
+    """Commands that wait change places with their agents."""
+    found = load(DISPLAY, DRONES | {"body.delay": delay})
     pairs, cells = (plan_of(found, precision=64, record=True, grid=grid) for grid in (False, True))
     assert slotted(cells) and not slotted(pairs)
     one, two = (cpu.fly_on_cpu(plan, tables(found, plan, seed), device="python") for plan in (pairs, cells))

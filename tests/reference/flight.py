@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from airflock.check.truths import flock_solver
 from airflock.core import radio, random
+from airflock.core.body import first_command
 from airflock.core.contract import State, call_rule
 from airflock.core.maths import norm
 from airflock.core.metric import Metric
@@ -46,7 +47,8 @@ class Agent:
 
     state      : true position (m) and velocity (m/s)
     pilot      : what decides; b, s: the numbers of its body and sensor; remembered, sensed: what these remember
-    command    : what it flies by: its pilot's last command, if no fault has overruled it
+    command    : its pilot's last command, if no fault has overruled it
+    waiting, followed : commands that wait for the body's dead time, with the step when each is due; the one it flies by
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
     rays       : how many it cast at its last decision
     links      : by the number of another agent, what the radio keeps of what that one sends
@@ -61,6 +63,8 @@ class Agent:
     remembered: Any = None
     sensed: Any = None
     command: Vector = ZERO
+    waiting: list[tuple[int, Vector]] = field(default_factory=list)
+    followed: Vector = ZERO
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
     rays: float = 0.0
@@ -144,6 +148,10 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
                 agent = flock[i]
                 if scenario.flight.update == "sequential":
                     decisions(scenario, seed, (place, course), flock, step, states(flock), step * dt, [i])
+                if step % every == 0:
+                    agent.waiting.append((step + times["lag"], agent.command))
+                if agent.waiting and agent.waiting[0][0] <= step:
+                    agent.followed = agent.waiting.pop(0)[1]
                 advance(scenario, seed, step, i, agent, gust, place)
     told = {"present": here / ((step + 1) * len(flock))} if may_leave else {}
     return Flown(scores.totals() | course.values() | told, frames, components(flock, dims)[: 2 * dims], 0)
@@ -165,7 +173,8 @@ def boarded(scenario: Scenario, seed: int, place: FlightWorld, i: int, state: St
     )  # fmt: skip
     kept, sensed = (each() if each else None for each in (scenario.body.rule.Memory, scenario.sensors.rule.Memory))
     s = own_parameters(scenario, "sensors", scenario.sensors.numbers, i, seed)
-    return Agent(state, pilot, b, s, kept, sensed)
+    before = first_command(scenario.model.command, state[3:])
+    return Agent(state, pilot, b, s, kept, sensed, followed=before)
 
 
 def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any]) -> bool:
@@ -485,7 +494,7 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
         g = (*(four[:2] if step % 2 == 0 else four[2:]), 0.0)
     a = scenario.wind
     w = (a.east + gust[0], a.north + gust[1], a.up + gust[2] if three else 0.0)
-    known = {"v": s[3:], "m": plus(s, agent.own)[3:], "c": agent.command, "g": g, "w": w}
+    known = {"v": s[3:], "m": plus(s, agent.own)[3:], "c": agent.followed, "g": g, "w": w}
     given = {letter + axis: vector[c] for letter, vector in known.items() for c, axis in enumerate("xyz")}
     moved = call_rule(
         body.move,

@@ -118,7 +118,8 @@ def law_of(scenario: Scenario, agent: int) -> tuple[Any, Any]:
 def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, seed: int) -> Any:
     """Numbers of model or body of one agent: its group's, off them by its tolerance."""
     letter, changed = {"model": "p", "body": "b", "sensors": "s"}[section], {}
-    for place, (name, declared, _) in enumerate(declarations(record)):
+    own = [each for each in declarations(record) if (section, each[0]) != ("body", "delay")]  # one for all agents
+    for place, (name, declared, _) in enumerate(own):
         for group in scenario.groups:
             if agent in group.agents and isinstance(declared, Quantity):
                 value = group.numbers.get((letter, name), getattr(record, name))

@@ -87,6 +87,7 @@ def test_what_cannot_be_extended_is_told_with_the_file_s_name(tmp_path, monkeypa
 def test_a_last_word_that_one_section_has_is_that_key():
     mine = load(NAME, {"delay": 0.4, "v_flock": 5.0})
     assert mine.radio.delay == 0.4 and mine.parameters.v_flock == 5.0 and mine.metrics.v_flock is None
+    assert mine.body.delay == 0.0
     assert {"delay is read as radio.delay", "v_flock is read as model.v_flock"} <= set(mine.notes)
 
 

@@ -11,7 +11,7 @@ from .agent import (
     sum_neighbours as sum_neighbours,
     sum_surfaces as sum_surfaces,
 )
-from .body import Body as Body, body as body
+from .body import Body as Body, BodyParameters as BodyParameters, body as body, first_command as first_command
 from .contract import (
     CLOCKS as CLOCKS,
     COMMANDS as COMMANDS,

@@ -1,7 +1,7 @@
 """The contract of a body: its vocabulary, and the rules that turn a command into a motion."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,9 +11,11 @@ from airflock.core.contract import (
     call_rule,
     check_memory_record,
     initial_values,
+    merge_parameters,
     namespace_names,
 )
-from airflock.core.parameters import Parameters
+from airflock.core.maths import norm
+from airflock.core.parameters import Parameters, quantity
 from airflock.support import RuleError
 
 STATE = {
@@ -64,6 +66,21 @@ RULES = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
+class BodyParameters(Parameters):
+    """Parameters of every body: the dead time before it, which a flight keeps; no rule reads it."""
+
+    delay: float = quantity(
+        0.0,
+        "s",
+        low=0.0,
+        high=10.0,
+        usual=(0.0, 1.0),
+        source="no body of a paper has one; ArduCopter 4.6.0-dev in software in the loop has 0.4 s",
+        meaning="dead time between a command and the body that follows it; the same for all agents",
+    )
+
+
 @dataclass(frozen=True)
 class Body:
     """Rules that turn a command into a motion, gathered from a module.
@@ -105,6 +122,15 @@ class Body:
     def limit_errors(self, **arguments: Any) -> list[str]:
         """Return what this body cannot fly, one line each, from the arguments that `limits` may request."""
         return [] if self.limits is None else list(call_rule(self.limits, "limits", arguments, self.name))
+
+
+def first_command(command: str, velocity: Sequence[float]) -> tuple[float, ...]:
+    """Return the command that a body follows until the first one is due: to fly on at a velocity (m/s).
+
+    command : what its law commands: velocity, acceleration or heading
+    """
+    scale = {"velocity": 1.0, "acceleration": 0.0, "heading": 1.0 / norm(*velocity, *(0.0,) * (3 - len(velocity)))}
+    return tuple(scale[command] * v for v in velocity)
 
 
 def body(namespace: Any, name: str = "") -> Body:
@@ -151,7 +177,10 @@ def body(namespace: Any, name: str = "") -> Body:
     for optional in ("limits", "endures"):
         if found.get(optional) is not None:
             argument_names(found[optional], optional, name)
+    parameters = merge_parameters(BodyParameters, found.get("Parameters"), f"body {name}")
+    if not issubclass(parameters, BodyParameters):
+        raise RuleError(f"body {name}: delay is the dead time before every body; call its own number otherwise")
     return Body(
-        name, found.get("Parameters", Parameters), found["ACCEPTS"], found["INTEGRATION"], found["move"],
+        name, parameters, found["ACCEPTS"], found["INTEGRATION"], found["move"],
         dict(found.get("VIOLATES", {})), memory, found.get("limits"), found.get("endures"),
     )  # fmt: skip

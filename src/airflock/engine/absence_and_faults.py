@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core import DISTURBED_STATES, Body, Fault, choices, number_names
+from airflock.core import DISTURBED_STATES, Body, Fault, choices, first_command, number_names
 from airflock.engine.initial_rows import law_memories, metric_memories, pair_values
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import fault_memory_row, fault_row
@@ -131,6 +131,10 @@ def add_agent(state: "DriverState", agent: int, position: list[float], velocity:
             work[rows[name], before] = motion[true]
     state.arrays["past"][:, :, before] = 0.0  # by no fault
     state.arrays["past"][:, : len(motion), before] = list(motion.values())
+    if state.plan.lags:  # until its first decision is due it flies on as it came
+        command = first_command(state.plan.model.command, velocity)
+        state.arrays["past"][:, state.plan.command_in_ring :, before] = command
+        work[[rows[f"obeyed_{axis}"] for axis in state.plan.axes], before] = command
     state.reset_pair_distances()
 
 

@@ -222,7 +222,7 @@ def estimated_bytes(scenario: Scenario, plan: Plan, agents: int) -> int:
     times, real, width = step_counts(scenario), plan.bits // 8, lane_count(agents)
     kept = max(len(getattr(memory, "_fields", ())) for memory in plan.memories)
     kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
-    past = times["ring"] * plan.in_ring if plan.late else 0
+    past = times["ring"] * plan.in_ring if plan.remembers else 0
     numbers = (ROWS + kept + past) * width + (agents * len(plan.of_pair) * width if plan.packets else 0)
     cells = 8 * CHUNKS * (MAX_CELLS_PER_AGENT * agents + SPARE) if plan.grid else 0
     return real * numbers + cells + _frames(scenario, plan, agents)

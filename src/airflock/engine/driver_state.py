@@ -415,6 +415,7 @@ def _rows(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
             name,
             *repeated.get(name, ()),
             *([name[1:]] if name[0] in "mh" and name[1:] in new.plan.motion else []),
+            *([f"c{name[-1]}"] if name.startswith("obeyed_") else []),
         ]
         source = next((row for row in stand if row in had), None)
         if source is not None:
@@ -447,6 +448,7 @@ def _under_way(old: DriverState, new: DriverState, step: int, lanes: NDArray[np.
     """
     past, every = old.arrays["past"][..., lanes], old.whole("decide_every")
     made = np.empty_like(new.arrays["past"])
+    made[:, new.plan.command_in_ring :] = _waiting(old, new, step, lanes)
     motion, work = len(new.plan.motion), new.arrays["work"]
     for c, kind, what in new.plan.sent_faults:
         made[:, c] = work[new.driver.ROWS[fault_row(kind, what)]]
@@ -461,6 +463,24 @@ def _under_way(old: DriverState, new: DriverState, step: int, lanes: NDArray[np.
         slot = past[max(0, min(k, newest)) % len(past)]
         made[k % len(made), :motion] = slot[:motion]
         made[k % len(made), list(same)] = slot[list(same.values())]
+    return made
+
+
+def _waiting(old: DriverState, new: DriverState, step: int, lanes: NDArray[np.int64]) -> NDArray[Any]:
+    """Commands in the ring of the new plan, (slot, axis, lane): those that wait go on waiting, as the new delay says.
+
+    With a longer delay the oldest one is followed meanwhile; where none waited, the command of now.
+    """
+    size, first, had = len(new.arrays["past"]), old.plan.command_in_ring, len(old.arrays["past"])
+    made = np.empty((size, new.plan.dimensions * new.plan.lags, len(lanes)), new.arrays["past"].dtype)
+    if not new.plan.lags:
+        return made
+    every, newest = old.whole("decide_every"), (step - 1) // old.whole("decide_every")
+    if not old.plan.lags or every != new.whole("decide_every"):
+        made[:] = old.arrays["work"][[old.driver.ROWS[f"c{axis}"] for axis in old.plan.axes]][:, lanes]
+        return made
+    for k in range(newest - size + 1, newest + 1):
+        made[k % size] = old.arrays["past"][max(k, newest - had + 1) % had, first:, lanes].T
     return made
 
 

@@ -101,6 +101,7 @@ class PlanProperties:
     few       : each of its rates sends at most `core.radio.FEW` packets in a decision
     silent    : an agent stops while a neighbour that it has lost could be near
     sequential: one agent after another perceives, decides and moves
+    lags      : commands wait for body.delay before the body follows them
     faults    : kinds of fault that may occur
     varied    : numbers that differ among agents, as (letter, name); each is a row
     topology  : which of the agents that it hears an agent meets; None: all. fading: signals differ by chance
@@ -132,6 +133,7 @@ class PlanProperties:
     is_shepherd: bool = False
     own: bool = False
     sequential: bool = False
+    lags: bool = False
     dimensions: int = 2
     has_sensor_error: bool = True
     delayed: bool = True
@@ -161,7 +163,7 @@ class PlanProperties:
 
 INTEGER_NAMES = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
-    "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born",
+    "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born", "lag",
 )  # fmt: skip
 
 NO_PACKET_TIME = -1e9  # s; time stamp of a packet that has not come
@@ -279,8 +281,18 @@ class Plan(PlanProperties):
 
     @property
     def in_ring(self) -> int:
-        """How many numbers of each agent a slot of the ring holds: its state, then columns of faults."""
+        """How many numbers of each agent a slot of the ring holds: its state, columns of faults, then its command."""
+        return self.command_in_ring + self.dimensions * self.lags
+
+    @property
+    def command_in_ring(self) -> int:
+        """Where in a slot of the ring the command of its decision begins."""
         return 2 * self.dimensions + len(self.sent_faults)
+
+    @property
+    def remembers(self) -> bool:
+        """Return True if the ring is in use: for what is heard, or for commands that wait."""
+        return self.late or self.lags
 
     @property
     def told(self) -> bool:
@@ -512,6 +524,7 @@ def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: Buil
         body=scenario.body.rule,
         body_choices=_chosen(scenario.body.numbers),
         sequential=scenario.flight.update == "sequential",
+        lags=step_counts(scenario)["lag"] > 0,
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=_chosen(scenario.aero) if scenario.is_aerodynamic else (),

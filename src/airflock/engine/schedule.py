@@ -33,6 +33,8 @@ ORDER: Mapping[str, StepEvent] = {
     ),
     "watch": StepEvent(("measure_collision",), "collide_every"),
     "sample": StepEvent(("measure_sample",), "sample_every"),
+    "queue": StepEvent(("queue",), "decide_every"),  # a command joins those that wait
+    "obey": StepEvent(("obey",), "decide_every"),  # behind the decision by the body's dead time
     "move": StepEvent(("move",)),
 }
 STAGES_PER_LAW = ("neighbours", "boundaries", "decide")  # which ask a law: one of each for every law of the flock
@@ -48,6 +50,8 @@ NEEDED: Mapping[str, Callable[[Plan], bool]] = {
     "boundaries": lambda plan: plan.model.boundary is not None,
     "flock": lambda plan: plan.model.flock is not None,
     "stop": lambda plan: plan.stops_for_lost,
+    "queue": lambda plan: plan.lags,
+    "obey": lambda plan: plan.lags,
     "overrule": lambda plan: bool(plan.suffers("overrule")),
     "measure_collision": lambda plan: any(metric.clock == "collision" for metric in plan.metrics),
     "measure_sample": lambda plan: any(metric.clock == "sample" for metric in plan.metrics),

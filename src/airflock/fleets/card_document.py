@@ -7,7 +7,7 @@ from typing import Any
 
 from shapely.geometry import Polygon
 
-from airflock.core import Parameters, forward, with_defaults
+from airflock.core import BodyParameters, Parameters, forward, with_defaults
 from airflock.drones import CARD_VERSION, SafetyLimits
 from airflock.parts.bodies import Parameters as Multirotor
 from airflock.scenarios import Scenario
@@ -102,7 +102,7 @@ def make_card_document(
         "operator": operator.hex(),
         "autopilot": autopilot,
         "law": {"kind": scenario.model.name, **to_json_table(scenario.parameters)},
-        "body": {"kind": scenario.body.rule.name, **to_json_table(scenario.body.numbers)},
+        "body": {"kind": scenario.body.rule.name, **_body_table(scenario.body.numbers)},
         "own": _member_differences(scenario, agent_records(scenario, len(members), seed)),
         **_group_numbers(scenario, len(members)),
         "world": to_json_table(replace(scenario.world, latitude=None, longitude=None)),  # the site says where it is
@@ -187,6 +187,12 @@ def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> l
                 f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
             )
     return notes
+
+
+def _body_table(body: BodyParameters) -> dict[str, Any]:
+    """Return the numbers of a body; a card of one without a dead time has the hash that it had before there was one."""
+    table = to_json_table(body)
+    return table if body.delay else {key: value for key, value in table.items() if key != "delay"}
 
 
 def _check_flyable(scenario: Scenario) -> None:

@@ -12,6 +12,7 @@ Sources: PX4 user guide, Parameter Reference (not flown); ArduPilot Copter, page
 
 import math
 import struct
+from collections import deque
 from collections.abc import Callable, Sequence
 from operator import itemgetter
 from typing import Any
@@ -268,6 +269,7 @@ class SoftwareVehicle:
         self.target: Velocity = (0.0, 0.0, 0.0)
         # What reached its motors last, and what faults make of the command, m/s.
         self.last_command = self._faulty_command = NO_VELOCITY
+        self._waiting: deque[Velocity] = deque()  # commands of the last steps, which the body has yet to follow
         # Arrival (s) and value of the command that the faults have seen last.
         self._fault_key: tuple[float, Velocity] | None = None
         self.setpoint_at, self.stream_since, self.takeoff_height = -1e9, -1e9, 0.0
@@ -651,6 +653,12 @@ class SoftwareVehicle:
         limit = self.parameters["GUID_TIMEOUT"] if self.kind == "ardupilot" else 1e9
         return self.target if self.mode == GUIDED and late <= limit else (0.0, 0.0, 0.0)
 
+    def _due_command(self, command: Velocity, velocity: Velocity, lag: int) -> Velocity:
+        """Return the command of `lag` steps ago, as a simulated body follows it; before it, to fly on as it flies."""
+        self._waiting.extend([velocity] * (lag - len(self._waiting)))
+        self._waiting.append(command)
+        return self._waiting.popleft()
+
     def step(self, now: float, dt: float) -> None:
         """Move from now to now + dt."""
         self.now, number = now, self.steps
@@ -658,6 +666,7 @@ class SoftwareVehicle:
         if not self.armed and self.state.z <= 0.0:
             self.state = State(*self.state[:3], 0.0, 0.0, 0.0)
             self.memory = type(self.memory)() if self.memory is not None else None
+            self._waiting.clear()
             return
         (x, y, z, vx, vy, vz), c = self.state, self.autopilot_velocity() if self.armed else NO_VELOCITY
         # Without motors the body is given a velocity ever further down: it falls as fast as its
@@ -670,6 +679,8 @@ class SoftwareVehicle:
                 self._fault_key, self._faulty_command = command_key, self.faults.motor_command(self.place, now, c)
             command = self._faulty_command
         self.last_command = command
+        if self.b.delay and not falls:
+            command = self._due_command(command, (vx, vy, vz), round(self.b.delay / dt))
         eu, ev, ew = self.error[3:]
         measured = vx + eu, vy + ev, vz + ew
         values = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)

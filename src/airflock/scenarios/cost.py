@@ -16,14 +16,15 @@ def step_counts(scenario: Scenario) -> dict[str, int]:
     """Return all times of a scenario in motion steps."""
     dt, q = scenario.flight.dt, scenario.resolved_metrics()
     decide_every = max(1, round(scenario.sensors.period / dt))
-    delay = round(scenario.radio.delay / dt)
+    delay, lag = round(scenario.radio.delay / dt), round(scenario.body.delay / dt)
     return {
         "steps": round(scenario.flight.duration / dt),
         "decide_every": decide_every,
         "sample_every": max(1, round(q.period / dt)),
         "collide_every": round((q.collision_period or dt) / dt),
         "delay": delay,
-        "ring": delay // decide_every + 2,
+        "ring": max(delay, lag) // decide_every + 2,
+        "lag": lag,
     }
 
 

@@ -338,6 +338,8 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             errors.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
         elif key == "period" and where.endswith("sensors"):
             errors.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
+        elif key == "delay" and where.endswith("body"):
+            errors.append(f"{where}.{key}: all bodies follow their commands after one dead time; set body.delay")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
             share = relative_spread(value["spread"], known.get(key))
@@ -397,7 +399,8 @@ def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, r
     values = [float(getattr(record, name, None) or 0.0)] * agents
     for group in groups:
         own_record = group.law[1] if group.law and letter == "p" else record
-        known = {key: declared for key, declared, _ in declarations(own_record)}
+        # Without the dead time, which is one for all: the place of a number among the others decides its draw.
+        known = {key: declared for key, declared, _ in declarations(own_record) if (letter, key) != ("b", "delay")}
         declared = known.get(name)
         if not isinstance(declared, Quantity):
             values = [0.0 if agent in group.agents else value for agent, value in enumerate(values)]

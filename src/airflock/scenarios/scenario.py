@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from airflock.core import (
     Body,
+    BodyParameters,
     Fault,
     Metric,
     MetricSet,
@@ -175,6 +176,8 @@ class Scenario:
             for each in ORDER
             if each.letter
         }
+        # The dead time is counted in steps (`step_counts`); no rule of a body reads it.
+        columns["b"] = tuple(name for name in columns["b"] if name not in number_names(BodyParameters))
         return columns | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
 
     @cached_property

@@ -233,7 +233,9 @@ def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: boo
         errors += world_errors(world, count, separation or 0.0, begin, started=started)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         errors += timing_errors(flight, parts["sensors"].period, parts["metrics"])
-        errors += update_order_errors(flight, flown.sensors, parts["sensors"], flown.radio, parts["radio"])
+        errors += update_order_errors(
+            flight, flown.sensors, parts["sensors"], flown.radio, parts["radio"], parts["body"]
+        )
         errors += silence_errors(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
         errors += metric_errors(flown.metrics, parts["metrics"], world)
         errors += wing_errors(parts, law, flown.metrics, started)

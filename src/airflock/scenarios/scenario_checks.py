@@ -44,8 +44,11 @@ def sensor_errors(sensor: Sensor, parts: Mapping[str, Any]) -> list[str]:
 IDEAL = {"radio.kind": "'constant'", "sensors.kind": "'perfect'"}  # what is not ideal at 0
 
 
-def update_order_errors(flight: Any, sensor: Sensor, sensors: Any, radio: Radio, k: Any) -> list[str]:
-    """Return why agents cannot update in turn: they need ideal perception at every step."""
+def update_order_errors(flight: Any, sensor: Sensor, sensors: Any, radio: Radio, k: Any, b: Any) -> list[str]:
+    """Return why agents cannot update in turn: they need ideal perception at every step, and follow commands at once.
+
+    sensors, k, b : parameters of sensor, radio and body; None where they have errors
+    """
     if flight.update == "synchronous" or sensors is None or k is None:
         return []
     # A period of one step is as good as none.
@@ -57,7 +60,9 @@ def update_order_errors(flight: Any, sensor: Sensor, sensors: Any, radio: Radio,
         "radio.loss": k.loss,
         "radio.kind": radio.name if radio.keeps_packets else 0.0,
     }
-    return [
+    waits = b is not None and round(b.delay / flight.dt) > 0
+    errors = [f"body.delay = {b.delay:g} s: with update = 'sequential' no command waits; set body.delay = 0"] * waits
+    return errors + [
         f"{key} = {value}: update = 'sequential' needs ideal perception at every step; set {key} = "
         + IDEAL.get(key, "0")
         for key, value in ideal.items()

@@ -194,6 +194,7 @@ def timing_notes(scenario: Scenario) -> list[str]:
         "duration": scenario.flight.duration,
         "sensors.period": scenario.sensors.period,
         "radio.delay": scenario.radio.delay,
+        "body.delay": scenario.body.delay,
         "metrics.period": scenario.metrics.period,
         "metrics.collision_period": scenario.metrics.collision_period or dt,
     }

@@ -23,7 +23,8 @@ def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
     keys: dict[str, list[str]] = {}
     for section, record in records.items():
         for name, declared, _ in declarations(record):
-            if section:
+            # `delay` alone was the radio's before bodies had one, and stays it.
+            if section and (section, name) != ("body", "delay"):
                 # Optional numbers of metrics default to the scenario's own; without this rule
                 # `v_flock` would be ambiguous in every law that has it.
                 derived = section == "metrics" and isinstance(declared, Quantity) and declared.optional

@@ -343,7 +343,7 @@ def _shuffled(scope: str, how: str, form: str, width: int) -> str:
 
 STAGES = (
     "snapshot", "perceive", "tune", "neighbours", "boundaries", "flock", "decide", "stop", "overrule", "move", "aim_",
-    "glide_", "appear_", "measure_",
+    "glide_", "appear_", "measure_", "first_command", "queue", "obey",
 )  # fmt: skip
 # Stages that a kernel has within others: in `move`, so that registers carry them over; in
 # `neighbours`, whose rows of one agent they read and write.
@@ -506,7 +506,7 @@ class CudaBuilder(Builder):
 
     def prepare_stage(self, name: str, lines: list[str]) -> list[str]:
         """Text of a stage before it is lowered."""
-        if name == "snapshot" or (name == "perceive" and self.plan.late):
+        if name in ("snapshot", "first_command", "queue", "obey") or (name == "perceive" and self.plan.late):
             return checked_replace(lines, "ring[", "past[")
         if name.startswith("measure_") and any("j in range(m)" in line for line in lines):
             return checked_replace(lines, " & (integer(j) < nn)", "")  # its pair loops end with the last agent

@@ -14,12 +14,12 @@ from airflock.engine.passes import flock
 from airflock.engine.passes.build import branch_lines, loop_lines, sampled_columns
 from airflock.engine.passes.driver import make_stages
 from airflock.engine.passes.flock import flock_rules
-from airflock.engine.passes.stage_functions import add_excursion
+from airflock.engine.passes.stage_functions import add_excursion, add_ring
 from airflock.engine.plan import INTEGER_NAMES, Plan
 from airflock.engine.schedule import sequential_stages, stages_of_events
 from airflock.engine.specialise.known_values import LocalVector, driver_argument
 from airflock.engine.specialise.specialiser import specialise
-from airflock.engine.stages import start
+from airflock.engine.stages import move, start
 from airflock.engine.stages.approach import SLACK
 from airflock.engine.stages.decide import MAX_GATHERED
 from airflock.engine.stages.measure import measured_metrics
@@ -59,11 +59,11 @@ def begin_lines(build: CudaBuilder) -> list[str]:
     lines += ["cuda.syncthreads()"]
     if plan.given_start:
         given = [f"{own_row(build, name)} = starts[block, {c}, i]" for c, name in enumerate(plan.motion)]
-        return [*lines, *agent_loop(build, given), "cuda.syncthreads()", *_heard_at_start(build)]
+        return [*lines, *agent_loop(build, given), "cuda.syncthreads()", *_ring_at_start(build)]
     if plan.start in FORMATIONS:
         lines_, _ = helper_lines(build, start.place_in_formation, s=LocalVector("s", "vector"))
         placed = [*lines_, *(f"{own_row(build, a)} = s_{a}" for a in axes), f"{own_row(build, 'vx')} = row_w.speed"]
-        return [*lines, *agent_loop(build, placed), "cuda.syncthreads()", *_heard_at_start(build)]
+        return [*lines, *agent_loop(build, placed), "cuda.syncthreads()", *_ring_at_start(build)]
     draw = try_place_lines(build, "e")
     gap = " + ".join(
         f"(s_{a} - {position_text(build, 'j', a)}) * (s_{a} - {position_text(build, 'j', a)})" for a in axes
@@ -90,7 +90,7 @@ def begin_lines(build: CudaBuilder) -> list[str]:
     turning = [*branch_lines("row_w.speed > ZERO", turn)]
     return [
         *lines, *loop_lines("e in range(n)", body), *agent_loop(build, [*seated, *turning]), "cuda.syncthreads()",
-        *_heard_at_start(build),
+        *_ring_at_start(build),
     ]  # fmt: skip
 
 
@@ -124,10 +124,10 @@ def agent_loop(build: CudaBuilder, body: Iterable[str]) -> list[str]:
     return branch_lines("i < n", body) if build.shape.registers else loop_lines("i in range(tid, n, THREADS)", body)
 
 
-def _heard_at_start(build: CudaBuilder) -> list[str]:
-    if not build.plan.late:
-        return []
-    return loop_lines("slot in range(slots)", [build.stages["snapshot"].call()])
+def _ring_at_start(build: CudaBuilder) -> list[str]:
+    """What is heard, and what bodies follow, before anything was sent or decided."""
+    stages = ["snapshot"] * build.plan.late + ["first_command"] * build.plan.lags
+    return [line for name in stages for line in loop_lines("slot in range(slots)", [build.stages[name].call()])]
 
 
 # ------------------------------------------------------------------------------ what a thread holds
@@ -206,6 +206,7 @@ def number_lines(build: CudaBuilder) -> list[str]:
     wide = {"seed_low": "u32", "seed_high": "u32"}
     lines = [
         f"{'slots' if w == 'ring' else w} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(INTEGER_NAMES)
+        if w != "lag" or build.plan.lags
     ]
     return [
         *lines,
@@ -329,7 +330,7 @@ def _leave(build: CudaBuilder) -> list[str]:
     # As on a CPU, agents behind the one that leaves move up by one. A mark tested in every loop
     # would touch each metric.
     up = _in_registers(build) if registers else _in_tables()
-    up += _shifted("past", "slots * past.shape[1]", "e // past.shape[1], e % past.shape[1], {c}") if plan.late else []
+    up += _shifted("past", "slots * past.shape[1]", "e // past.shape[1], e % past.shape[1], {c}") if plan.remembers else []
     if plan.packets:
         up += [*_shifted("store", "store.shape[0] * LANES", "e // LANES, e % LANES, {c}"), "cuda.syncthreads()"]
         up += _shifted("store", "store.shape[0] * LANES", "e // LANES, {c}, e % LANES")
@@ -387,6 +388,8 @@ def flight_text(plan: Plan, shape: BlockLayout) -> str:
     """Text of the driver that flies one flock per block: kernel `fly`."""
     build = CudaBuilder(plan, shape)
     make_stages(build)
+    if plan.lags:
+        add_ring(build, move.first_command)
     body = _time(build)  # first: it may still name rules
     lines = [*memory_lines(build), *begin_lines(build), *body, *_end(build)]
     options = "fastmath=True" + ("" if shape.simulated else f", launch_bounds={shape.bounds}, cache=True")
@@ -414,6 +417,9 @@ def _time(build: CudaBuilder) -> list[str]:
     if plan.late:
         lines += ["next_hear = integer((decide_every - delay % decide_every) % decide_every)"]
         lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
+    if plan.lags:  # one round of the ring is added: the number of the decision begins negative
+        lines += ["next_obey = integer(lag % decide_every)"]
+        lines += ["slot_obey = integer((next_obey - lag + slots * decide_every) // decide_every % slots)"]
     lines += ["begun = integer(0)"] * bool(plan.faults)
     step = ["time = real(step) * row_c.dt", *begin_fault_lines(build)]
     if plan.struck:  # once any fault has begun, all lanes are tested: each thread tests its own agent
@@ -544,6 +550,7 @@ def _choose(build: CudaBuilder) -> list[str]:
         if name == "tune":
             continue  # runs before, in _perceived
         lines += [build.stages[name].call(k_="k"), *barrier]
+    lines += ["slot = slot_out", build.stages["queue"].call()] if build.plan.lags else []
     lines += ["k = integer(k + 1); next_decide = integer(step + decide_every)"]
     return [*lines, "slot_out = integer(slot_out + 1) if slot_out + 1 < slots else integer(0)"]
 
@@ -606,13 +613,22 @@ def _advance(build: CudaBuilder) -> list[str]:
     """One motion step; with a sequential update each agent in turn meets, decides and moves."""
     further = "moved += real(2.0) * math.sqrt(answer) * row_c.dt"
     if not build.plan.sequential:
-        return [build.stages["move"].call(), further]
+        return [*_obey(build), build.stages["move"].call(), further]
     due = sequential_stages(build.plan)
     met = [name for name in due if name.startswith("neighbours")]  # one for each law
     turn = [*(build.stages[name].call(k_="step") for name in met), *["cuda.syncthreads()"] * bool(met)]
     alone = [build.stages[name].call(k_="step") for name in due if name not in met]
     turn += [*branch_lines("tid == 0", [*alone, "fastest_ = most(fastest_, answer)"]), "cuda.syncthreads()"]
     return ["fastest_ = ZERO", *loop_lines("i in range(n)", turn), "answer = fastest_", further]
+
+
+def _obey(build: CudaBuilder) -> list[str]:
+    """Take the commands that are due out of the ring."""
+    if not build.plan.lags:
+        return []
+    take = ["slot = slot_obey", build.stages["obey"].call(), "next_obey = integer(step + decide_every)"]
+    take += ["slot_obey = integer(slot_obey + 1) if slot_obey + 1 < slots else integer(0)"]
+    return branch_lines("step == next_obey", take)
 
 
 def _end(build: CudaBuilder) -> list[str]:

@@ -397,6 +397,8 @@ def cell_plan_error(plan: Plan, agents: int) -> str | None:
         return f"one big flock starts at random or given places, not in start.kind = {plan.start}"
     if plan.dryden:
         return "one big flock in Dryden turbulence flies on cpu"
+    if plan.lags:
+        return "one big flock whose commands wait for body.delay flies on cpu"
     if plan.body.Memory is not None:
         return f"a body that remembers ({plan.body.name}) flies on cpu in one big flock"
     if plan.goals or plan.own or plan.scene or plan.stop:

@@ -45,7 +45,7 @@ def array_shapes(plan: Plan, rows: int, shape: BlockLayout, tables: WorldTables)
     kept = sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
     return {
         "starts": (2 * dims, n) if plan.given_start else (1, 1),
-        "pasts": (whole["ring"], plan.in_ring, lanes) if plan.late else (1, 1, 1),
+        "pasts": (whole["ring"], plan.in_ring, lanes) if plan.remembers else (1, 1, 1),
         "stores": (len(plan.of_pair), lanes, lanes) if plan.packets else (2 * dims + 1, 1, 1),
         "owns": (max(len(plan.columns), 1), lanes),
         "works": (rows, lanes) if table else (1, 1),

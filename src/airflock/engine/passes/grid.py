@@ -120,8 +120,12 @@ def add_rearrange(build: Builder) -> None:
         "put(n, table, kept, whose)", loop_lines("c in range(table.shape[0])", rows), "return 0", parallel=True
     )
     each = [f"put(n, {table}, kept, whose)" for table in ("work", "mem", "memory")]  # one function, compiled once
+    if build.plan.lags:
+        each += loop_lines("slot in range(past.shape[0])", ["put(n, past[slot], kept, whose)"])
     build.function(
-        "rearrange(n, work, mem, memory, cells)", [*bind_lines(build), "kept = totals_[:n]", *each], "return 0"
+        f"rearrange(n, work, {'past, ' * build.plan.lags}mem, memory, cells)",
+        [*bind_lines(build), "kept = totals_[:n]", *each],
+        "return 0",
     )
 
 

@@ -123,10 +123,10 @@ def add_error_functions(build: Builder) -> perceive.ErrorFunctions | None:
     return perceive.ErrorFunctions(build.stages["wander"], build.stages["err"])
 
 
-def add_snapshot(build: Builder) -> None:
-    """Function snapshot: the true states into a slot of the ring."""
-    made = specialise(build, perceive.snapshot)
-    build.function("snapshot(slot, m, work, ring)", ["apart()"] * build.apart, made.lines, once=True)
+def add_ring(build: Builder, stage: Callable[..., Any]) -> None:
+    """Function of a stage that writes or reads a slot of the ring: snapshot, first_command, queue or obey."""
+    made = specialise(build, stage)
+    build.function(f"{stage.__name__}(slot, m, work, ring)", ["apart()"] * build.apart, made.lines, once=True)
 
 
 def add_meet(build: Builder) -> None:

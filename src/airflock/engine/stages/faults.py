@@ -9,7 +9,7 @@ from typing import Any
 
 from airflock.core import DISTURBED_STATES, Fault
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Axes, FlockRows
+from airflock.engine.stages.state import Axes, FlockRows, followed_command
 from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, call_rule, choose, least, most, real
 
 
@@ -163,9 +163,9 @@ def apply_motion_fault(
     i: int, moved: Any, kind: Fault, time: Any, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> Any:
     """Return the velocity after a motion step as the rule `motion` of a kind of fault changes it, m/s."""
-    before = flock.before_step
+    before, command = flock.before_step, followed_command(flock, plan=plan)
     return call_rule(
         kind.motion, vx=before[X][i], vy=before[Y][i], vz=before[Z][i],
-        cx=flock.command[X][i], cy=flock.command[Y][i], cz=flock.command[Z][i],
+        cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
         nx=moved[X], ny=moved[Y], nz=moved[Z], dt=numbers.c.dt, **fault_arguments(i, kind, time, flock, plan=plan),
     )  # fmt: skip

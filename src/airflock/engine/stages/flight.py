@@ -106,6 +106,9 @@ def prepare(
         # hears its neighbours from the first decision on.
         for slot in range(whole.ring):
             call_rule(stages["snapshot"], slot=slot, ring=past)
+    if order["queue"]:
+        for slot in range(whole.ring):
+            call_rule(stages["first_command"], slot=slot, ring=past)
     held[BEGUN] = ONE
 
 
@@ -216,6 +219,15 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             # two passes over the flock.
             if plan.struck and (step == first or step % whole.decide_every == 0):  # between, agents keep their places
                 hurt_first, hurt_end = call_rule(stages["struck"], time=time)
+            for name in order["queue"]:
+                if step % whole.decide_every == 0:
+                    call_rule(stages[name], slot=step // whole.decide_every % whole.ring, ring=past)
+            for name in order["obey"]:
+                # One round of the ring is added: before the first command is due the number of the
+                # decision is negative.
+                if (step - whole.lag) % whole.decide_every == 0:
+                    waited = step - whole.lag + whole.ring * whole.decide_every
+                    call_rule(stages[name], slot=waited // whole.decide_every % whole.ring, ring=past)
             fastest = call_rule(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             if drifts:  # noqa: SIM108 - a helper of several lines stands where it is assigned
                 nearer = approach_bound(held, fastest, numbers.c.dt)

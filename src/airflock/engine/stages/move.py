@@ -3,12 +3,14 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from airflock.core import norm
 from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import velocity_beside_drift
 from airflock.engine.stages.faults import apply_motion_fault, has_fault
-from airflock.engine.stages.state import FlockRows, agent_numbers, record_from_rows
+from airflock.engine.stages.state import FlockRows, agent_numbers, followed_command, record_from_rows
 from airflock.engine.stages.words import (
     HALF_SIZES,
+    ONE,
     ZERO,
     X,
     Y,
@@ -23,6 +25,32 @@ from airflock.engine.stages.words import (
     real,
     rule_asks,
 )
+
+
+def first_command(flock: FlockRows, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
+    """Set the commands that bodies follow until those of the first decision are due: to fly on as they started."""
+    v = flock.velocity
+    for i in range(m):
+        f = ONE / norm(v[X][i], v[Y][i], v[Z][i]) if plan.model.command == "heading" else ONE
+        for a in range(plan.dimensions):
+            flock.obeyed[a][i] = ZERO if plan.model.command == "acceleration" else f * v[a][i]
+            ring[slot, plan.command_in_ring + a, i] = flock.obeyed[a][i]
+
+
+def queue(flock: FlockRows, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
+    """Put the commands of a decision into its slot of the ring, where they wait for the body's dead time."""
+    # The ring of what is heard has slots by decisions already; commands are further columns of it.
+    # They join it before a motion step and not at the decision, since a caller may overrule them.
+    for a in range(plan.dimensions):
+        for i in range(m):
+            ring[slot, plan.command_in_ring + a, i] = flock.command[a][i]
+
+
+def obey(flock: FlockRows, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
+    """Take the commands that are due out of the ring, for bodies to follow until the next ones are."""
+    for a in range(plan.dimensions):
+        for i in range(m):
+            flock.obeyed[a][i] = ring[slot, plan.command_in_ring + a, i]
 
 
 def measured_velocity(i: int, a: int, flock: FlockRows, *, plan: Plan) -> Any:
@@ -69,7 +97,7 @@ def apply_body(
     lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
 ) -> None:
     """Advance velocities by the rule of the body."""
-    v, command = flock.velocity, flock.command
+    v, command = flock.velocity, followed_command(flock, plan=plan)
     # One call of the rule per lane, whatever the body: what it needs of wind, noise or memory is
     # decided when the driver is made, so that the loop has no branch.
     for i in lanes:

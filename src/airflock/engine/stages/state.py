@@ -69,7 +69,8 @@ class FlockRows:
 
     position: Axes = axes_attribute("")  # true state, m
     velocity: Axes = axes_attribute("v")  # m/s
-    command: Axes = axes_attribute("c")  # command to the body
+    command: Axes = axes_attribute("c")  # command as decided
+    obeyed: Axes = axes_attribute("obeyed_")  # that which the body follows, where commands wait
     measured_position: Axes = axes_attribute("m")  # own state as the agent believes it, m
     measured_velocity: Axes = axes_attribute("mv")  # m/s
     heard_position: Axes = axes_attribute("h")  # its state as others hear it, m
@@ -143,6 +144,11 @@ class FlockRows:
     def own(self, letter: str, name: str) -> Row:
         """A number that differs among agents."""
         return self.take(own_row(letter, name))
+
+
+def followed_command(flock: FlockRows, *, plan: Plan) -> Axes:
+    """Return the command that bodies follow now: the one decided last, or where commands wait the one that is due."""
+    return flock.obeyed if plan.lags else flock.command
 
 
 def scene_tree(scene: Any) -> tuple[Any, Any, Any]:

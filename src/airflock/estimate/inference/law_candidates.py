@@ -91,6 +91,8 @@ def make_candidate(base: Scenario, scale: TrackScale, axes: int) -> LawCandidate
     """Make a candidate of a scenario of its law."""
     name = base.name
     scenario = without_noise(base, scale, axes)
+    if scenario.body.delay > 0.0:
+        raise ScenarioError([f"{name}: body.delay: a step is predicted from the last states alone; set body.delay = 0"])
     if scenario.model.flock is not None:
         raise ScenarioError([f"{name}: has a rule of the whole flock, which no single individual follows"])
     if scenario.flight.update != "synchronous":
@@ -189,7 +191,7 @@ def _numbers(scenario: Scenario, plan: Plan, scale: TrackScale) -> tuple[FitPara
         names = plan.records[letter]
         first = _first(plan, letter)
         for name, declared, _ in declarations(record):
-            if not isinstance(declared, Quantity) or (section == "body" and name in ("noise", "drag")):
+            if not isinstance(declared, Quantity) or (section == "body" and name in ("delay", "noise", "drag")):
                 continue
             default = getattr(record, name)
             if default is None:

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from airflock.core import Parameters as Record, quantity, shorten
+from airflock.core import BodyParameters, quantity, shorten
 
 ACCEPTS = "velocity"  # the COMMAND that this body takes
 INTEGRATION = "new"  # positions move by the velocity that has just been commanded
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(BodyParameters):
     """A body without inertia."""
 
     speed_max: float = quantity(

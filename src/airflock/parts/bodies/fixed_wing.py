@@ -24,7 +24,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core import Parameters as Record, arc_cosine, clamp, norm, quantity
+from airflock.core import BodyParameters, arc_cosine, clamp, norm, quantity
 from airflock.parts.bodies.battery import battery_end, battery_energy, battery_kind, lasting, left
 
 ACCEPTS = "velocity"
@@ -33,7 +33,7 @@ OURS = "our choice: a small electric aircraft"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(BodyParameters):
     """Controllers and engine of an aircraft; span, chord, weight, cd0, cl_max and air are those of the wing."""
 
     efficiency: float = quantity(

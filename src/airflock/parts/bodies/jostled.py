@@ -3,14 +3,14 @@
 import math
 from dataclasses import dataclass
 
-from airflock.core import Parameters as Record, quantity, shorten
+from airflock.core import BodyParameters, quantity, shorten
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"  # positions move by the velocity that has just been commanded, like a direct body's
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(BodyParameters):
     """A body without inertia in turbulent air."""
 
     speed_max: float = quantity(

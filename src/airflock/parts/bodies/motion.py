@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from airflock.core import Parameters as Record, quantity, shorten
+from airflock.core import BodyParameters, quantity, shorten
 
 NAME = "multirotor"
 ACCEPTS = "velocity"  # the COMMAND that this body takes
@@ -12,7 +12,7 @@ S5 = "Vásárhelyi et al. 2018, Table S5"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(BodyParameters):
     """A multirotor whose low-level controller follows a velocity. Defaults: Table S5."""
 
     tau: float = quantity(1.0, "s", low=0.01, high=60.0, source=S5, meaning="relaxation time towards the command")

@@ -20,7 +20,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core import Parameters as Record, norm, quantity, shorten
+from airflock.core import BodyParameters, norm, quantity, shorten
 from airflock.parts.bodies.battery import battery_end, battery_energy, battery_kind, hovering, lasting, left
 
 ACCEPTS = "velocity"
@@ -30,7 +30,7 @@ SEA_LEVEL = "ICAO standard atmosphere, sea level"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(BodyParameters):
     """A quadrotor of about 1 kg behind a velocity controller."""
 
     tau: float = quantity(

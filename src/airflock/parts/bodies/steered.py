@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from airflock.core import Parameters as Record, norm, quantity, shorten
+from airflock.core import BodyParameters, norm, quantity, shorten
 
 ACCEPTS = "acceleration"
 INTEGRATION = "new"  # Eq. 12: positions move by the velocity after the step
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(BodyParameters):
     """Limits of speed; forces and mass belong to the model, because a boid's force is its impulse to steer."""
 
     speed_max: float = quantity(

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from airflock.core import Parameters as Record, arc_cosine, choice, norm, quantity
+from airflock.core import BodyParameters, arc_cosine, choice, norm, quantity
 
 NAME = "heading"
 ACCEPTS = "heading"
@@ -11,7 +11,7 @@ INTEGRATION = "new"  # unless the key body.integration says otherwise
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(BodyParameters):
     """Speed and agility."""
 
     speed: float = quantity(
