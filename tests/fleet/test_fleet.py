@@ -58,7 +58,7 @@ def test_three_drones_fly_the_simulated_flight_for_a_minute():
     assert all(not any(node.refused.values()) for node in flown.nodes)
 
 
-ODD = [{"radio.loss": 0.5, "radio.loss_at": 40.0}, {"radio.kind": "links"}, {"world.dimensions": "3"}]
+ODD = [{"radio.loss": 0.5, "radio.loss_at": 40.0}, {"radio.kind": "links"}, {"world.dimensions": "3"}, {"body.delay": 0.35}]
 
 
 @pytest.mark.parametrize("settings", ODD, ids=str)

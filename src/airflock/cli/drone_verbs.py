@@ -42,7 +42,11 @@ def fleet(
     vehicle: Annotated[str, typer.Option(help="Autopilot that the vehicles imitate: px4 or ardupilot.")] = "px4",
     body: Annotated[
         str | None,
-        typer.Option(metavar="multirotor|quadrotor", help="How the vehicles move.", show_default="the scenario's"),
+        typer.Option(
+            metavar="multirotor|quadrotor|autopilot",
+            help="How the vehicles move.",
+            show_default="the scenario's; with --vehicle ardupilot and a preset autopilot",
+        ),
     ] = None,
     mode: Annotated[
         str,
@@ -103,8 +107,7 @@ def fleet(
     errors, live = options.collect_option_errors(ctx), mode != flying.LOCKSTEP_MODE
     errors.read(options.check_writable, (save, RECORDINGS), (card_file, (".json",)))
     settings = options.collect_settings(errors, changes, agents, duration)
-    if body in flying.VEHICLE_BODIES:
-        settings = errors.read(lambda given: given | {"body.kind": body}, settings)
+    settings = errors.read(lambda given: flying.vehicle_body(scenario, given, vehicle, body), settings)
     loaded = options.collect_scenario(errors, scenario, settings, trust=trust)
     loaded = errors.read(
         lambda found: compare.with_metric_period(found, found.sensors.period or found.flight.dt), loaded
@@ -415,8 +418,8 @@ def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None
     terminal.print_message(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
     for load in loads:
         terminal.print_message(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
-    for guard in card.autopilot.parameter_checks:
-        why = guard.reason(card.safety.speed_max, card.safety.response)
+    for guard in card.parameter_checks:
+        why = guard.reason(card.safety.speed_max, card.safety.response + card.safety.delay)
         terminal.print_message(f"set {' or '.join(guard.names)} {guard.told()}: {why}")
     for name, meaning in card.autopilot.battery_parameters.items():
         terminal.print_message(f"look at {name}: {meaning}")

@@ -102,7 +102,7 @@ def make_card_document(
         "operator": operator.hex(),
         "autopilot": autopilot,
         "law": {"kind": scenario.model.name, **to_json_table(scenario.parameters)},
-        "body": {"kind": scenario.body.rule.name, **_body_table(scenario.body.numbers)},
+        "body": {"kind": scenario.body.rule.name, **_with_dead_time(scenario.body.numbers)},
         "own": _member_differences(scenario, agent_records(scenario, len(members), seed)),
         **_group_numbers(scenario, len(members)),
         "world": to_json_table(replace(scenario.world, latitude=None, longitude=None)),  # the site says where it is
@@ -115,7 +115,7 @@ def make_card_document(
         },
         "silence": to_json_table(silence),
         **({"topology": to_json_table(scenario.topology.numbers)} if scenario.topology.rule is not None else {}),
-        "safety": to_json_table(limits),
+        "safety": _with_dead_time(limits),
         "fence": {
             "corners": fence_corners(scenario.world, margin),
             "low": min(2.0, 0.5 * limits.base),
@@ -175,11 +175,12 @@ def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> l
             f"not speak of {members}"
         )
     likely = default_safety(scenario)
-    if safety.response < likely.response:
-        notes.append(
-            f"response = {safety.response:g} s is shorter than what the scenario gives a card, {likely.response:g} s: "
-            "distances to stop are told too short, unless the drones are as quick"
-        )
+    for name in ("response", "delay"):
+        if getattr(safety, name) < getattr(likely, name):
+            notes.append(
+                f"{name} = {getattr(safety, name):g} s is shorter than what the scenario gives a card, "
+                f"{getattr(likely, name):g} s: distances to stop are told too short, unless the drones are as quick"
+            )
     for name in ("accel", "brake"):
         if getattr(safety, name) > likely.accel:
             notes.append(
@@ -189,10 +190,10 @@ def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> l
     return notes
 
 
-def _body_table(body: BodyParameters) -> dict[str, Any]:
-    """Return the numbers of a body; a card of one without a dead time has the hash that it had before there was one."""
-    table = to_json_table(body)
-    return table if body.delay else {key: value for key, value in table.items() if key != "delay"}
+def _with_dead_time(record: BodyParameters | SafetyLimits) -> dict[str, Any]:
+    """Return a record as a table; without a dead time it has the hash that it had before there was one."""
+    table = to_json_table(record)
+    return table if record.delay else {key: value for key, value in table.items() if key != "delay"}
 
 
 def _check_flyable(scenario: Scenario) -> None:
@@ -243,11 +244,16 @@ def _group_numbers(scenario: Scenario, count: int) -> dict[str, list[int]]:
 
 def default_safety(scenario: Scenario) -> SafetyLimits:
     """Return the limits that follow from a scenario: 1.5 times the preferred speed, as agile as its body."""
-    body = scenario.body.numbers if isinstance(scenario.body.numbers, Multirotor) else Multirotor()
+    usual, body = Multirotor(), scenario.body.numbers
+    accel = min(getattr(body, "a_max", usual.a_max), 50.0)
+    # Until an acceleration that grows by a jerk is there, half of the time is as good as lost.
+    ramp = 0.5 * accel / body.jerk if hasattr(body, "jerk") else 0.0
     return SafetyLimits(
         speed_max=min(1.5 * _preferred_speed(scenario), 60.0),
-        accel=min(body.a_max, 50.0),
-        response=body.tau,
+        accel=accel,
+        response=getattr(body, "tau", usual.tau),
+        delay=min(body.delay + ramp, 10.0),
+        brake=min(SafetyLimits.brake, accel),
         mission_time=min(max(scenario.flight.duration, 1.0), 36000.0),
     )
 

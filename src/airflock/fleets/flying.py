@@ -17,13 +17,28 @@ from airflock.fleets.lockstep import write_card_and_key
 from airflock.fleets.realtime import DEFAULT_CLIENT, FLEET_MODES, fly_in_realtime, lockstep_only_errors
 from airflock.parts.metrics import reported_values
 from airflock.recordings import measure_recording, with_units
-from airflock.scenarios import Scenario, check_seeds, scenario_variant
+from airflock.scenarios import Scenario, check_seeds, load, presets, scenario_variant
 from airflock.support import ScenarioError, collect_errors, expand_path, suggest
 
 VEHICLE_KINDS = ("px4", "ardupilot")
-VEHICLE_BODIES = ("multirotor", "quadrotor")
+VEHICLE_BODIES = ("multirotor", "quadrotor", "autopilot")
 LOCKSTEP_MODE = FLEET_MODES[0]
 FIRST_CLIENT_PORT = 14540  # port where the first vehicle contacts a client
+
+
+def vehicle_body(
+    scenario: str | Path | Scenario, settings: Mapping[str, Any], vehicle: str, body: str | None
+) -> dict[str, Any]:
+    """Return the settings with the body that the vehicles have: a given one, or of ArduPilot the measured one.
+
+    A preset's own body is that of a paper; a file of one's own, and settings of the body, are meant.
+    """
+    if body in VEHICLE_BODIES:
+        return {**settings, "body.kind": body}
+    meant = str(scenario) not in presets() or any(key == "body" or key.startswith("body.") for key in settings)
+    if vehicle != "ardupilot" or meant or load(str(scenario)).vehicle.name != "multirotor":
+        return dict(settings)
+    return {**settings, "body.kind": "autopilot"}
 
 
 @dataclass
@@ -110,7 +125,8 @@ def fleet(
     vehicle : str
         Autopilot that the vehicles imitate: px4 or ardupilot.
     body : str, optional
-        How the vehicles move: multirotor or quadrotor; by default as the scenario says.
+        How the vehicles move: multirotor, quadrotor or autopilot; by default as the scenario says, but imitations of
+        ArduPilot that fly a preset move as ArduCopter at its defaults was measured to (autopilot).
     mode : str
         lockstep: on a virtual clock, the same bits each time. tasks, processes: on the real clock over UDP on this
         computer, in one process or with a process for each node and each vehicle.
@@ -167,7 +183,7 @@ def fleet(
     known: Scenario | None = None
     injected: tuple[InjectedFault, ...] = ()
     with collect_errors(mistakes):
-        keys = {**(settings or {}), **({"body.kind": body} if body in VEHICLE_BODIES else {})}
+        keys = vehicle_body(scenario, settings or {}, vehicle, body)
         found = scenario_variant(scenario, keys, trust=trust)
         known = compare.with_metric_period(found, found.sensors.period or found.flight.dt)
         if faults is not None:

@@ -266,6 +266,10 @@ class SoftwareVehicle:
         self.mode, self.armed, self.battery = FIRST_MODES[kind], False, 100.0
         ours = ("MAV_SYS_ID",) if kind == "px4" else ("SYSID_THISMAV", "SYSID_MYGCS")
         self.parameters = DEFAULT_PARAMETERS[kind] | dict.fromkeys(ours, system)
+        # As quick as its body: limits that this has not are out of reach.
+        limits = {"accel": getattr(b, "a_max", 50.0), "jerk": getattr(b, "jerk", 1e4), "speed": 60.0}
+        checks = (check for check in self.autopilot.parameter_checks if check.limits)
+        self.parameters |= {check.name: check.scale * limits[check.limits] for check in checks}
         self.target: Velocity = (0.0, 0.0, 0.0)
         # What reached its motors last, and what faults make of the command, m/s.
         self.last_command = self._faulty_command = NO_VELOCITY

@@ -4,6 +4,7 @@ Sources: PX4 user guide, pages Offboard Mode and Parameter Reference; ArduPilot 
 Commands in Guided Mode and Complete Parameter List. Numbers of commands and messages: MAVLink common.xml.
 """
 
+import math
 import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -28,6 +29,9 @@ NODE_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 STREAM_RATES = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node requests, 1/s
 
 
+SLOWER = 0.2  # share by which a limit may be lower than the card says; our choice: one drone differs so from another
+
+
 class ParameterCheck(NamedTuple):
     """A parameter of the autopilot with its range of safe values, checked before the drone may arm.
 
@@ -36,6 +40,8 @@ class ParameterCheck(NamedTuple):
     timeout      : time-out (s) during which the drone flies on; `reason` adds the distance of that flight; 0: none
     unsafe_value : a value inside the range that is not safe
     later_name   : its name in later versions of the autopilot
+    limits       : what of the drone's response it limits: accel (m/s²), jerk (m/s³) or speed (m/s); the card says what
+                   is needed, and `scale` is its unit
     """
 
     name: str
@@ -46,6 +52,8 @@ class ParameterCheck(NamedTuple):
     timeout: float = 0.0
     unsafe_value: float | None = None
     later_name: str = ""
+    limits: str = ""
+    scale: float = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -56,6 +64,10 @@ class ParameterCheck(NamedTuple):
         """Return its value among those that an autopilot has reported; None if it has not."""
         return next((parameters[name] for name in self.names if name in parameters), None)
 
+    def reaching(self, needed: float) -> "ParameterCheck":
+        """Return the check for a card that relies on a limit of at least `needed`, in SI units."""
+        return self._replace(low=(1.0 - SLOWER) * self.scale * needed)
+
     def range(self, member: int) -> tuple[float, float]:
         """Return the least and the largest value that is safe for a member of a flock."""
         return (float(member), float(member)) if self.own else (self.low, self.high)
@@ -65,6 +77,8 @@ class ParameterCheck(NamedTuple):
         if self.own and member is None:
             return "to the own system id"
         low, high = self.range(member or 0)
+        if self.limits:
+            return f"at least {low:g}"
         return f"within [{low:g}, {high:g}]" + ("" if self.unsafe_value is None else f", not {self.unsafe_value:g}")
 
     def safe(self, value: float, member: int) -> bool:
@@ -124,6 +138,7 @@ def px4_mode(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
+RELIED_ON = "the card relies on it; raise it, or prepare a card of body.kind = 'autopilot'"
 # The ranges are ours where the manuals allow more: a drone that hovers after a lost link is hit by
 # one that flies on, so both autopilots must land.
 AUTOPILOTS = {
@@ -147,6 +162,9 @@ AUTOPILOTS = {
                 "its own fence acts: 2 hold, 3 return, 5 land; 4 cuts the motors",
                 unsafe_value=4.0,
             ),
+            ParameterCheck("MPC_ACC_HOR", 0.0, math.inf, f"m/s^2; {RELIED_ON}", limits="accel"),
+            ParameterCheck("MPC_JERK_AUTO", 0.0, math.inf, f"m/s^3; {RELIED_ON}", limits="jerk"),
+            ParameterCheck("MPC_XY_VEL_MAX", 0.0, math.inf, f"m/s; {RELIED_ON}", limits="speed"),
         ),
         battery_parameters={
             "BAT1_CAPACITY": "capacity in mAh, on which its per cent rest; -1: on the voltage alone",
@@ -177,6 +195,9 @@ AUTOPILOTS = {
                 own=True,
                 later_name="MAV_GCS_SYSID",  # since Copter 4.7
             ),
+            ParameterCheck("WPNAV_ACCEL", 0.0, math.inf, f"cm/s^2; {RELIED_ON}", limits="accel", scale=100.0),
+            ParameterCheck("PSC_JERK_XY", 0.0, math.inf, f"m/s^3; {RELIED_ON}", limits="jerk"),
+            ParameterCheck("WPNAV_SPEED", 0.0, math.inf, f"cm/s; {RELIED_ON}", limits="speed", scale=100.0),
         ),
         battery_parameters={
             "BATT_CAPACITY": "capacity in mAh, on which its per cent rest: is it that of this battery?",

@@ -26,7 +26,7 @@ from airflock.core import (
     model,
     quantity,
 )
-from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot
+from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot, ParameterCheck
 from airflock.parts.bodies import BODIES
 from airflock.parts.topologies import TOPOLOGIES, parameters as topologies
 from airflock.support import (
@@ -155,11 +155,15 @@ class SafetyLimits(Record):
     climb_max: float = quantity(2.0, "m/s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="largest vertical speed")
     accel: float = quantity(
         6.0, "m/s^2", low=0.1, high=50.0, source="Vásárhelyi et al. 2018, Table S5",
-        meaning="a command differs from the own velocity by at most accel (response + tick)",
+        meaning="a command differs from the own velocity by at most accel (delay + response + tick)",
     )  # fmt: skip
     response: float = quantity(
         1.0, "s", low=0.01, high=60.0, source="Vásárhelyi et al. 2018, Table S5", meaning="relaxation time of the drone"
     )
+    delay: float = quantity(
+        0.0, "s", low=0.0, high=10.0, source="Vásárhelyi et al. 2018 have none",
+        meaning="dead time of the drone, for which it flies on before it answers a command",
+    )  # fmt: skip
     brake: float = quantity(
         2.5, "m/s^2", low=0.1, high=20.0, source=OWN_CHOICE, meaning="deceleration of the braking curve at the fence"
     )
@@ -377,6 +381,7 @@ HEARING_KEYS = (
 NUMBER_RANGES = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
+MAX_RAMP = 0.3  # of the relaxation time, in which an acceleration is there; our choice: 20 m/s³ for 6 m/s² and 1 s
 MAX_SYSTEM_ID = 250  # system ids above are left to ground stations
 
 
@@ -424,6 +429,15 @@ class FlightCard:
     seed: int
     hash: str
     document: Mapping[str, Any] = field(repr=False)
+
+    @cached_property
+    def parameter_checks(self) -> tuple[ParameterCheck, ...]:
+        """Return what is checked of the autopilot before the drone arms, by the response that this card relies on."""
+        s = self.safety
+        # A body without a limit of jerk is one whose acceleration is there at once.
+        jerk = getattr(self.body_parameters, "jerk", s.accel / (MAX_RAMP * s.response))
+        needed = {"accel": s.accel, "jerk": jerk, "speed": s.speed_max}
+        return tuple(c.reaching(needed[c.limits]) if c.limits else c for c in self.autopilot.parameter_checks)
 
     def layer(self, member: int) -> float:
         """Return the height (m) of a member's own layer."""

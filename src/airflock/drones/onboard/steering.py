@@ -43,7 +43,8 @@ def limit_velocity(
     vz = clamp(wanted_velocity[2], -safety.climb_max, safety.climb_max)
     # As far ahead of the own velocity as the drone can follow until the next setpoint, so that
     # nothing is lost.
-    dx, dy, dz = shorten(vx - own.vx, vy - own.vy, vz - own.vz, safety.accel * (safety.response + safety.tick))
+    answers = safety.delay + safety.response
+    dx, dy, dz = shorten(vx - own.vx, vy - own.vy, vz - own.vz, safety.accel * (answers + safety.tick))
     vx, vy, vz = own.vx + dx, own.vy + dy, own.vz + dz
     fenced = False
     walls = list(surfaces)
@@ -54,7 +55,7 @@ def limit_velocity(
             outward = -(vx * nx + vy * ny + vz * nz)
             if outward <= 0.0:
                 continue
-            lag = max(-(own.vx * nx + own.vy * ny + own.vz * nz), 0.0) * safety.response  # flown before it slows down
+            lag = max(-(own.vx * nx + own.vy * ny + own.vz * nz), 0.0) * answers  # flown before it slows down
             most = braking_curve(distance - safety.soft_margin - lag, safety.brake, safety.brake_gain)
             if outward > most:
                 k = outward - most
