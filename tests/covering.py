@@ -53,7 +53,8 @@ PLANS = {
         ],
     }),
     "polygon": ("vasarhelyi_2018", {
-        "agents": 8, "body.kind": "autopilot", "world.arena": "polygon", "world.corners": NOTCHED, "radio.kind": "links", "radio.loss": 0.6,
+        "agents": 8, "body.kind": "autopilot",
+        "world.arena": "polygon", "world.corners": NOTCHED, "radio.kind": "links", "radio.loss": 0.6,
         "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "radio.fast_rate": 33.0, "wind.north": -1.5,
         "sensors.kind": "delayed", "sensors.lag": 0.4, "radio.delay": 0.31, "sensors.period": 0.3,
         "metrics.period": 0.5, "faults": [

@@ -15,6 +15,7 @@ from random import Random
 import numpy as np
 import pytest
 
+import airflock
 from airflock.core import random
 from airflock.core.contract import State
 from airflock.core.radio import lost
@@ -58,7 +59,10 @@ def test_three_drones_fly_the_simulated_flight_for_a_minute():
     assert all(not any(node.refused.values()) for node in flown.nodes)
 
 
-ODD = [{"radio.loss": 0.5, "radio.loss_at": 40.0}, {"radio.kind": "links"}, {"world.dimensions": "3"}, {"body.delay": 0.35}]
+ODD = [
+    {"radio.loss": 0.5, "radio.loss_at": 40.0}, {"radio.kind": "links"}, {"world.dimensions": "3"},
+    {"body.delay": 0.35},
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("settings", ODD, ids=str)
@@ -647,3 +651,18 @@ def test_a_fleet_in_python_is_that_of_the_command(monkeypatch):
         ScenarioError, match=r"vehicle = 'px5' is none of px4, ardupilot; did you mean px4\?\n.*\n.*rad"
     ):
         airflock.fleet("vasarhelyi_2018/real_4ms", vehicle="px5", card="c.json", settings={"radio.dela": 1.0})
+
+
+@pytest.mark.parametrize(("vehicle", "body", "settings", "flown"), [
+    ("ardupilot", None, {}, "autopilot"), ("px4", None, {}, "multirotor"),
+    ("ardupilot", "multirotor", {}, "multirotor"),
+    ("ardupilot", None, {"body.tau": 1.5}, "multirotor"), ("px4", "autopilot", {}, "autopilot"),
+])  # fmt: skip
+def test_imitations_of_ardupilot_move_as_it_was_measured_unless_another_body_is_meant(vehicle, body, settings, flown):
+    few = {"agents": 2, "duration": 0.4, "world.side": 120.0}
+    found = airflock.fleet("vasarhelyi_2018/real_4ms", settings=few | settings, vehicle=vehicle, body=body)
+    assert found.scenario.vehicle.name == flown
+    if flown == "autopilot":
+        b = found.scenario.body
+        assert (b.delay, b.tau, b.a_max, b.jerk) == (0.4, 1.2, 2.5, 5.0)
+        assert any("numbers of the file's multirotor are left out" in note for note in found.scenario.notes)

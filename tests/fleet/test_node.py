@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from airflock.core.agent import State
 from airflock.drones.mavlink import orders
+from airflock.drones.mavlink.autopilots import AUTOPILOTS
 from airflock.drones.mavlink.frames import FramePacker, common_dialect, frames_in
 from airflock.drones.mavlink.messages import DroneStatus, status_message
 from airflock.drones.mavlink.orders import OperatorOrder, OrderKind, new_operator_keys
@@ -20,12 +21,14 @@ from airflock.drones.onboard.flight_log import LoggingNode, read_node_memory, re
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import Node, NodeMemory, own_status
 from airflock.fleets.drone_faults import InjectedFault
+from airflock.fleets import compare
 from airflock.fleets.lockstep import START_TIME
 from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.fleets.vehicle import SoftwareVehicle
+from airflock.parts.bodies import BODIES
 from airflock.support.coordinates import Geodetic
 from airflock.support.errors import CardError, LinkError
-from fleets import PRIVATE, document, fleet, scenario
+from fleets import PRIVATE, card, document, fleet, scenario
 
 common = common_dialect()
 SCENARIO = scenario(3)
@@ -435,6 +438,66 @@ def test_each_miss_is_told_in_a_line(change, line):
     vehicle.origin = CARD.site.to_geodetic(*vehicle.state[:2], 0.0)
     notes = live(node, vehicle, 0.0, 2.0)
     assert [n for n in notes if re.search(line, n)], notes
+
+
+LIMITS = [(kind, c.name) for kind, autopilot in AUTOPILOTS.items() for c in autopilot.parameter_checks if c.limits]
+
+
+@pytest.mark.parametrize(("kind", "name"), LIMITS)
+@pytest.mark.parametrize("body", ["multirotor", "autopilot"])
+def test_an_autopilot_that_is_not_as_quick_as_its_card_says_is_not_cleared(kind, name, body):
+    """A fifth less is let pass; the card of a body relies on what that body can do, and its imitation can."""
+    found = scenario(3, **{"body.kind": body})
+    made = card(found, autopilot=kind)
+    (check,) = (check for check in made.parameter_checks if check.name == name)
+    relied_on = {
+        "accel": 2.5 if body == "autopilot" else 6.0, "speed": 6.0, "jerk": 5.0 if body == "autopilot" else 20.0,
+    }[check.limits]  # fmt: skip
+    for share, missed in ((1.0, False), (0.81, False), (0.79, True)):
+        vehicle = SoftwareVehicle(kind, 1, made.site, (0.0, 0.0, 0.0), found.vehicle, found.body, started=START_TIME)
+        vehicle.parameters[name] = share * relied_on * check.scale
+        node = Node(made, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
+        notes = live(node, vehicle, 0.0, 4.0)
+        lines = [note for note in notes if note.startswith(f"missing: {name} =")]
+        assert len(lines) == missed and all("is not at least" in line for line in lines), notes
+
+
+def test_arducopter_at_its_defaults_is_refused_by_the_card_of_a_paper_and_not_by_its_own():
+    """WPNAV_ACCEL 250 cm/s², PSC_JERK_XY 5 m/s³: its parameters are those of the body that was measured of it."""
+    kinds = ("autopilot", "multirotor")
+    slow, paper = (card(scenario(3, **{"body.kind": kind}), autopilot="ardupilot") for kind in kinds)
+    measured = BODIES["autopilot"]
+    b = measured.Parameters()
+    vehicle = SoftwareVehicle("ardupilot", 1, slow.site, (0.0, 0.0, 0.0), measured, b, started=START_TIME)
+    assert (vehicle.parameters["WPNAV_ACCEL"], vehicle.parameters["PSC_JERK_XY"]) == (250.0, 5.0)
+    refused = [
+        {c.name for c in each.parameter_checks if not c.safe(vehicle.parameters[c.name], 1)} for each in (slow, paper)
+    ]
+    assert refused == [set(), {"WPNAV_ACCEL", "PSC_JERK_XY"}]
+
+
+def test_the_card_of_a_body_tells_its_dead_time_and_half_of_its_ramp():
+    """ArduCopter as measured: 0.40 s, and 2.5 m/s² by 5 m/s³ take 0.5 s; no later than its acceleration it brakes."""
+    safety = card(scenario(3, **{"body.kind": "autopilot", "body.a_max": 2.0, "body.jerk": 4.0})).safety
+    assert (safety.delay, safety.response, safety.accel, safety.brake) == pytest.approx((0.65, 1.2, 2.0, 2.0))
+    usual = card(SCENARIO)
+    assert usual.safety.delay == 0.0 and "delay" not in usual.document["safety"] | usual.document["body"]
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("said", "true", "told"), [
+    ("multirotor", "multirotor", False), ("autopilot", "autopilot", False), ("multirotor", "autopilot", True),
+])  # fmt: skip
+def test_a_drone_that_answers_later_than_its_card_says_is_told_in_flight(said, true, told, seed):
+    """By its own commands and velocities, in 40 s of flocking; one as quick as its card says is never suspected."""
+    flown = compare.with_metric_period(scenario(4, 40.0, noisy=True, **{"body.kind": true}), 0.2)
+    promised = compare.default_safety(scenario(4, **{"body.kind": said}))
+    made = compare.software_card(flown)
+    limits = {name: getattr(promised, name) for name in ("response", "delay", "accel", "brake")}
+    made = replace(made, safety=replace(made.safety, **limits))
+    notes = [str(line) for line in compare.fly_in_lockstep(flown, made, seed).log]
+    late = [line for line in notes if "answers later than the card says" in line]
+    assert len(late) == (4 if told else 0), notes
 
 
 def test_no_site_is_doubted_before_there_are_satellites():

@@ -205,7 +205,8 @@ def number_lines(build: CudaBuilder) -> list[str]:
     """Integers and records of numbers of this world, once per kernel."""
     wide = {"seed_low": "u32", "seed_high": "u32"}
     lines = [
-        f"{'slots' if w == 'ring' else w} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(INTEGER_NAMES)
+        f"{'slots' if w == 'ring' else w} = {wide.get(w, 'integer')}(whole[{c}])"
+        for c, w in enumerate(INTEGER_NAMES)
         if w != "lag" or build.plan.lags
     ]
     return [
@@ -330,7 +331,8 @@ def _leave(build: CudaBuilder) -> list[str]:
     # As on a CPU, agents behind the one that leaves move up by one. A mark tested in every loop
     # would touch each metric.
     up = _in_registers(build) if registers else _in_tables()
-    up += _shifted("past", "slots * past.shape[1]", "e // past.shape[1], e % past.shape[1], {c}") if plan.remembers else []
+    if plan.remembers:
+        up += _shifted("past", "slots * past.shape[1]", "e // past.shape[1], e % past.shape[1], {c}")
     if plan.packets:
         up += [*_shifted("store", "store.shape[0] * LANES", "e // LANES, e % LANES, {c}"), "cuda.syncthreads()"]
         up += _shifted("store", "store.shape[0] * LANES", "e // LANES, {c}, e % LANES")
