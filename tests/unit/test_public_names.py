@@ -121,7 +121,9 @@ def test_keys_are_printed_for_people_and_for_machines():
     from typer.testing import CliRunner
 
     run = CliRunner().invoke
-    (key,) = loads(run(app, ["keys", "delay", "--json"]).stdout)
+    found = loads(run(app, ["keys", "delay", "--json"]).stdout)
+    assert {key["name"] for key in found} == {"radio.delay", "body.delay"}  # that of the radio, and of every body
+    (key,) = loads(run(app, ["keys", "radio.delay", "--json"]).stdout)
     assert key["name"] == "radio.delay" and key["unit"] == "s" and (key["low"], key["high"]) == (0.0, 30.0)
     text = run(app, ["keys", "radio"]).stdout
     assert "radio.delay" in text and "age of neighbours' data on arrival" in text and "[0 … 30 s]" in text

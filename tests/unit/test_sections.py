@@ -8,9 +8,11 @@ import pytest
 
 from airflock.engine import plan_of
 from airflock.scenarios import scenario as scenarios
+from airflock.scenarios.cost import step_counts
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, SECTIONS
+from airflock.support.errors import ScenarioError
 from inside import Builder, tables_module as engine_tables
 
 
@@ -51,6 +53,18 @@ def test_sections_are_the_records_of_a_scenario():
     for section in ORDER:
         own = section.record is None or isinstance(found.records[section.key], section.record)
         assert own or section.key == "body"
+
+
+def test_commands_wait_for_a_dead_time_in_whole_steps_and_not_where_agents_move_in_turn():
+    """A driver reads no number of seconds: it counts steps, and a dead time below half a step is none."""
+    base = {"agents": 3, "dt": 0.05}
+    found = load("vasarhelyi_2018/4ms", base | {"body.delay": 0.33})
+    assert step_counts(found)["lag"] == 7 and "delay" not in found.numbers["b"]
+    assert any("body.delay = 0.33 s is rounded to 0.35 s, 7 steps" in note for note in found.notes)
+    none = load("vasarhelyi_2018/4ms", base | {"body.delay": 0.02})
+    assert plan_of(none) == plan_of(load("vasarhelyi_2018/4ms", base)) != plan_of(found)
+    with pytest.raises(ScenarioError, match="body.delay = 0.4 s: with update = 'sequential' no command waits"):
+        load("zapotecatl_2016/best", {"body.delay": 0.4})
 
 
 def test_how_a_driver_is_built_is_no_field_to_patch():

@@ -195,8 +195,8 @@ def check_workers(timeout: float | None, scheduler: str | None, device: str) -> 
 WORSE = {
     "radio.delay": 1, "radio.range": -1, "radio.far": -1, "radio.received_far": -1, "radio.loss": 1,
     "sensors.noise": 1, "sensors.sd": 1, "sensors.jump_rate": 1, "sensors.outage_rate": 1, "sensors.lag": 1,
-    "sensors.period": 1, "body.noise": 1, "body.tau": 1, "body.a_max": -1, "wind.gust": 1, "wind.at_6m": 1,
-    "agents": 1,
+    "sensors.period": 1, "body.noise": 1, "body.tau": 1, "body.delay": 1, "body.a_max": -1, "body.jerk": -1,
+    "wind.gust": 1, "wind.at_6m": 1, "agents": 1,
 }  # fmt: skip
 # number that may be zero → first value above zero that is tried
 FIRST_VALUE = {

@@ -60,8 +60,9 @@ def update_order_errors(flight: Any, sensor: Sensor, sensors: Any, radio: Radio,
         "radio.loss": k.loss,
         "radio.kind": radio.name if radio.keeps_packets else 0.0,
     }
-    waits = b is not None and round(b.delay / flight.dt) > 0
-    errors = [f"body.delay = {b.delay:g} s: with update = 'sequential' no command waits; set body.delay = 0"] * waits
+    errors = []
+    if b is not None and round(b.delay / flight.dt) > 0:
+        errors = [f"body.delay = {b.delay:g} s: with update = 'sequential' no command waits; set body.delay = 0"]
     return errors + [
         f"{key} = {value}: update = 'sequential' needs ideal perception at every step; set {key} = "
         + IDEAL.get(key, "0")

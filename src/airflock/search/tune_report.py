@@ -268,7 +268,7 @@ ReportRow = tuple[str, str, str]  # key, value with its unit, source
 LEFT_OUT = ("published", "title", "format")
 READ_AS = {"body": "b", "sensors": "s", "radio": "k", "wind": "a"}  # section → what a driver calls its numbers
 DRYDEN = ("at_6m", "height", "airspeed")  # a driver reads what follows from them
-ALWAYS = ("sensors.period", "radio.delay")  # a driver reads them as numbers of steps
+ALWAYS = ("sensors.period", "radio.delay", "body.delay")  # a driver reads them as numbers of steps
 
 
 def document_rows(scenario: Scenario, searched: Collection[str]) -> list[ReportRow]:
