@@ -27,7 +27,7 @@ FIRST_CLIENT_PORT = 14540  # port where the first vehicle contacts a client
 
 
 def vehicle_body(
-    scenario: str | Path | Scenario, settings: Mapping[str, Any], vehicle: str, body: str | None
+    scenario: str | os.PathLike[str] | Scenario, settings: Mapping[str, Any], vehicle: str, body: str | None
 ) -> dict[str, Any]:
     """Return the settings with the body that the vehicles have: a given one, or of ArduPilot the measured one.
 
