@@ -71,14 +71,9 @@ class BodyParameters(Parameters):
     """Parameters of every body: the dead time before it, which a flight keeps; no rule reads it."""
 
     delay: float = quantity(
-        0.0,
-        "s",
-        low=0.0,
-        high=10.0,
-        usual=(0.0, 1.0),
-        source="no body of a paper has one; ArduCopter 4.6.0-dev in software in the loop has 0.4 s",
+        0.0, "s", low=0.0, high=10.0, usual=(0.0, 1.0), source="no body of a paper has one",
         meaning="dead time between a command and the body that follows it; the same for all agents",
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -155,12 +155,10 @@ class PredictedVelocity:
 
     def step(self, own: State, commands: Iterable[tuple[float, Velocity]], now: float, dt: float) -> None:
         """Fly for dt (s) by the newest command (time, velocity) that is due, and compare with the own velocity."""
-        due = [velocity for at, velocity in commands if at <= now - self._delay]
-        if due:
-            ax, ay, _ = shorten(
-                (due[-1][0] - self._vx) / self._response, (due[-1][1] - self._vy) / self._response, 0.0, self._accel
-            )
-            self._vx, self._vy = self._vx + ax * dt, self._vy + ay * dt
+        for cx, cy, _ in [velocity for at, velocity in commands if at <= now - self._delay][-1:]:
+            k = dt / self._response
+            dx, dy, _ = shorten(k * (cx - self._vx), k * (cy - self._vy), 0.0, self._accel * dt)
+            self._vx, self._vy = self._vx + dx, self._vy + dy
         k, ex, ey = min(dt / RESPONSE_TIME, 1.0), own.vx - self._vx, own.vy - self._vy
         self._mean_x += k * (ex - self._mean_x)
         self._mean_y += k * (ey - self._mean_y)
@@ -186,22 +184,20 @@ class ResponseWatch:
 
     def slower(self, own: State, command: Velocity, now: float) -> str:
         """Take the own velocity and the command of now; return one line once the drone is slower than its card."""
-        s, longest = self._safety, 2.0 * (self._safety.delay + self._safety.response)
+        s = self._safety
         if not self._drones:
             self._since = self._last = now
-            as_said = PredictedVelocity(s.delay, s.response, s.accel, own)
-            half = PredictedVelocity(s.delay + 0.5 * s.response, 1.5 * s.response, 0.5 * s.accel, own)
-            self._drones = [as_said, half]
+            half = s.delay + 0.5 * s.response, 1.5 * s.response, 0.5 * s.accel
+            self._drones = [PredictedVelocity(*said, own) for said in ((s.delay, s.response, s.accel), half)]
         for drone in self._drones:
             drone.step(own, self._commands, now, min(now - self._last, 0.5 * s.response))
         self._last = now
         self._commands.append((now, command))
-        while self._commands[0][0] < now - longest:
+        while self._commands[0][0] < now - 2.0 * (s.delay + s.response):
             self._commands.popleft()
         error, other = (drone.squared_error for drone in self._drones)
-        if self._said or now - self._since < 2.0 * RESPONSE_TIME or error < MIN_RESPONSE_ERROR**2:
-            return ""
-        if other > SLOWER_WINS * error:
+        watched = now - self._since > 2.0 * RESPONSE_TIME and error > MIN_RESPONSE_ERROR**2
+        if self._said or not watched or other > SLOWER_WINS * error:
             return ""
         self._said = True
         return (

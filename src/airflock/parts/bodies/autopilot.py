@@ -10,17 +10,17 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core import BodyParameters, quantity, shorten
+from airflock.core import quantity, shorten
+from airflock.parts.bodies import motion
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"  # positions move by the velocity after the step
 MEASURED = "measured on ArduCopter 4.6.0-dev in software in the loop, at its defaults"
-S5 = "as the multirotor, Vásárhelyi et al. 2018, Table S5"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(BodyParameters):
-    """A real autopilot, as it answers velocity set-points."""
+class Parameters(motion.Parameters):
+    """A real autopilot, as it answers velocity set-points; noise and drag are those of the multirotor."""
 
     delay: float = quantity(
         0.4, "s", low=0.0, high=10.0, usual=(0.0, 1.0), source=MEASURED,
@@ -36,13 +36,6 @@ class Parameters(BodyParameters):
     jerk: float = quantity(
         5.0, "m/s^3", low=0.01, high=1e4, source="PSC_JERK_XY of ArduCopter",
         meaning="largest change of the controlled acceleration per time",
-    )  # fmt: skip
-    noise: float = quantity(
-        0.2, "m^2/s^3", low=0.0, high=10.0, source=S5, meaning="diffusion constant of the outer noise (not an SD)"
-    )
-    drag: float = quantity(
-        0.1, "1/s", low=0.0, high=5.0, source="as the multirotor; our choice",
-        meaning="acceleration caused by the wind, per wind speed",
     )  # fmt: skip
 
 
