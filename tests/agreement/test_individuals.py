@@ -78,14 +78,16 @@ def test_a_flight_that_ends_at_a_collision_counts_that_instant(gone, apart):
     assert there == pytest.approx((3 * gone + 2 * (instants - gone)) / (3 * instants), rel=1e-12)
 
 
-@pytest.mark.parametrize("name", [*sorted(presets()), "lossy"])
+VARIANTS = {"lossy": {"radio.loss": 0.5}, "waiting": {"body.delay": 0.15}}  # of PAPER
+
+
+@pytest.mark.parametrize("name", [*sorted(presets()), *VARIANTS])
 def test_every_preset_flies_with_agents_that_come_and_go(name):
-    keys = {"radio.loss": 0.5} if name == "lossy" else {}
-    scenario = load(PAPER if name == "lossy" else name, keys)
+    keys = VARIANTS.get(name, {})
+    preset = PAPER if name in VARIANTS else name
+    scenario = load(preset, keys)
     few = {"agents": min(scenario.agents, 4), "duration": 40.0 * scenario.flight.dt}
-    scenario = load(
-        PAPER if name == "lossy" else name, {**keys, **(few if scenario.goals.kind != "own" else {"duration": 0.1})}
-    )
+    scenario = load(preset, {**keys, **(few if scenario.goals.kind != "own" else {"duration": 0.1})})
     told = []
     for steps in (40, 7):
         flight = airflock.open(scenario, 3, device="python")

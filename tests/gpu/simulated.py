@@ -63,7 +63,8 @@ CASES = {
     }, 2, True),
     "replaced": ("vasarhelyi_2018", REPLACED, 2, True),
     "replaced, in tables": ("vasarhelyi_2018", REPLACED, 1, False),
-    "leavers": ("vasarhelyi_2018", {
+    "leavers": ("vasarhelyi_2018", {  # their commands wait
+        "body.delay": 0.15,
         "agents": 6, "radio.loss": 0.4, "radio.delay": 0.2, "radio.kind": "shadow", "world.obstacles": ISLANDS,
         "silence.rule": "stop", "silence.patience": 0.1, "metrics.r_cluster": 12.0, "faults": [
             fault("fails", 0.0, [0]), fault("battery", 0.1, [3], endurance=0.2), fault("radio_deaf", 0.3, [4]),
