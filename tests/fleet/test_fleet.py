@@ -661,7 +661,7 @@ def test_a_fleet_in_python_is_that_of_the_command(monkeypatch):
 def test_imitations_of_ardupilot_move_as_it_was_measured_unless_another_body_is_meant(vehicle, body, settings, flown):
     few = {"agents": 2, "duration": 0.4, "world.side": 120.0}
     found = airflock.fleet("vasarhelyi_2018/real_4ms", settings=few | settings, vehicle=vehicle, body=body)
-    assert found.scenario.vehicle.name == flown
+    assert found.scenario.body.rule.name == flown
     if flown == "autopilot":
         b = found.scenario.body
         assert (b.delay, b.tau, b.a_max, b.jerk) == (0.4, 1.2, 2.5, 5.0)

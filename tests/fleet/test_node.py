@@ -454,7 +454,9 @@ def test_an_autopilot_that_is_not_as_quick_as_its_card_says_is_not_cleared(kind,
         "accel": 2.5 if body == "autopilot" else 6.0, "speed": 6.0, "jerk": 5.0 if body == "autopilot" else 20.0,
     }[check.limits]  # fmt: skip
     for share, missed in ((1.0, False), (0.81, False), (0.79, True)):
-        vehicle = SoftwareVehicle(kind, 1, made.site, (0.0, 0.0, 0.0), found.vehicle, found.body, started=START_TIME)
+        vehicle = SoftwareVehicle(
+            kind, 1, made.site, (0.0, 0.0, 0.0), found.body.rule, found.body.numbers, started=START_TIME
+        )
         vehicle.parameters[name] = share * relied_on * check.scale
         node = Node(made, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
         notes = live(node, vehicle, 0.0, 4.0)

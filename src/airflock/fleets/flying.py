@@ -36,7 +36,7 @@ def vehicle_body(
     if body in VEHICLE_BODIES:
         return {**settings, "body.kind": body}
     meant = str(scenario) not in presets() or any(key == "body" or key.startswith("body.") for key in settings)
-    if vehicle != "ardupilot" or meant or load(str(scenario)).vehicle.name != "multirotor":
+    if vehicle != "ardupilot" or meant or load(str(scenario)).body.rule.name != "multirotor":
         return dict(settings)
     return {**settings, "body.kind": "autopilot"}
 
