@@ -184,6 +184,16 @@ def test_a_law_has_its_noise_at_zero_and_its_ranges_cut_to_what_was_seen():
         assert lengths and all(n.high <= 1.2 * scale.far for n in lengths)
 
 
+def test_a_law_whose_commands_wait_cannot_be_inferred_and_its_dead_time_is_not_fitted():
+    """One step is predicted from the states before it; the commands under way are unknown."""
+    scale = candidates.TrackScale(near=5.0, far=50.0, speed=4.0, max_speed=6.0, period=0.1)
+    (at_once,), _ = candidates.law_scenarios(["vasarhelyi_2018"], {})
+    assert "body.delay" not in {number.key for number in candidates.make_candidate(at_once, scale, 2).numbers}
+    (late,), _ = candidates.law_scenarios(["vasarhelyi_2018"], {"body.delay": 0.4})
+    with pytest.raises(AirflockError, match="body.delay: .* set body.delay = 0"):
+        candidates.make_candidate(late, scale, 2)
+
+
 def test_gains_after_gaps_are_those_of_a_kalman_filter():
     period, q, r = 0.1, 0.7, 0.05  # variance that a velocity gains per period, m²/s²; SD of a position, m
     step = np.array([[1.0, period], [0.0, 1.0]])
