@@ -422,6 +422,9 @@ class AutopilotLink:
         x, y, z = self._site.local(v["lat"] * 1e-7, v["lon"] * 1e-7, v["alt"] * 1e-3)
         self.far = max(abs(x), abs(y), abs(z))
         if self.far >= MAX_DISTANCE or abs(v["lat"]) > 900_000_000 or abs(v["lon"]) > 1_800_000_000:
+            # ArduCopter sends 0, 0 until its EKF has an origin, some messages after the first fix.
+            if v["lat"] == v["lon"] == 0:
+                self.far = 0.0
             return False
         self.far = 0.0
         velocity = swap_enu_ned(v["vx"] * 0.01, v["vy"] * 0.01, v["vz"] * 0.01)
