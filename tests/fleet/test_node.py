@@ -20,8 +20,8 @@ from airflock.drones.onboard.card import card_hash, parse_card, read_card, write
 from airflock.drones.onboard.flight_log import LoggingNode, read_node_memory, replay
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import Node, NodeMemory, own_status
-from airflock.fleets.drone_faults import InjectedFault
 from airflock.fleets import compare
+from airflock.fleets.drone_faults import InjectedFault
 from airflock.fleets.lockstep import START_TIME
 from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.fleets.vehicle import SoftwareVehicle
