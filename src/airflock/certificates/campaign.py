@@ -285,7 +285,8 @@ PARTS = 60  # of a flight that is flown again: when an event happened is known t
 def with_distance_metrics(scenario: Scenario, limits: Sequence[EventLimit]) -> Scenario:
     """Return the scenario with metrics that miss no approach within the largest distance of a limit.
 
-    Collisions are looked for at every motion step, so its radius becomes that distance, unless other limits mind it.
+    Collisions are looked for at every motion step, so its radius becomes that distance, unless
+    other limits mind it.
     """
     radii = [limit.value for limit in limits if limit.score == "r_min"]
     if not radii:

@@ -49,8 +49,8 @@ class EventTiming:
 def event_timing(times: Sequence[float], flights: int, duration: float) -> EventTiming:
     """Compare the times (s) of first events of so many flights with an even rate.
 
-    An even rate h leaves 1 - p = exp(-h T) of the flights without an event, and of those with one the share
-    (1 - sqrt(1 - p)) / p has it in the first half.
+    An even rate h leaves 1 - p = exp(-h T) of the flights without an event, and of those with one
+    the share (1 - sqrt(1 - p)) / p has it in the first half.
     """
     events, early = len(times), sum(1 for t in times if t <= 0.5 * duration)
     p = min(events / max(flights, 1), 1.0 - 1e-9)
@@ -197,7 +197,8 @@ class Certificate:
 
         threads : of the flights, all processors by default
 
-        Raises StudyError for a certificate of more flights than its numbers can tell apart, or where one flies no more.
+        Raises StudyError for a certificate of more flights than its numbers can tell apart, or
+        where one flies no more.
 
         Examples
         --------
@@ -385,8 +386,8 @@ def check_certificate(
     trust   : True lets a law run that stands in a Python file named by the scenario
     on_done : called after each flight
 
-    Raises StudyError where the file is no certificate, of another format, version or scenario than it says; and an
-    AirflockError where it cannot be read.
+    Raises StudyError where the file is no certificate, of another format, version or scenario than
+    it says; and an AirflockError where it cannot be read.
 
     Examples
     --------

@@ -69,8 +69,8 @@ TIME_OVER = "time was over"
 def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[str]) -> dict[str, Any]:
     """Find the largest value of each key at which the events of all limits stay below a level, and the next value.
 
-    Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal; of zero
-    none), flights, and the interval that the scenario's file gives, if any.
+    Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to
+    nominal; of zero none), flights, and the interval that the scenario's file gives, if any.
     """
     campaign = flyer.campaign
     level = screening_level(campaign)
@@ -256,8 +256,8 @@ def check_map_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> d
 def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dict[str, Any]:
     """Verdict and bounds of every cell, on seeds that all cells share.
 
-    Returns plain values: level, keys, their units, values, and for each cell values, verdict, low, high (per flight),
-    flights.
+    Returns plain values: level, keys, their units, values, and for each cell values, verdict, low,
+    high (per flight), flights.
     """
     screen = ValueScreen(flyer, screening_level(flyer.campaign), MAP_PURPOSE)
     cells = []
@@ -493,7 +493,8 @@ def campaign_executor(
 def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, folder: Path, resume: bool) -> Campaign:
     """Return the campaign with a number of flights if a limit has no rate: as many as the budget allows.
 
-    A few flights on seeds of their own measure how long one takes; the number is fixed before the first one counts.
+    A few flights on seeds of their own measure how long one takes; the number is fixed before the
+    first one counts.
     """
     if campaign.flights is not None or all(limit.rate is not None for limit in campaign.limits):
         return campaign

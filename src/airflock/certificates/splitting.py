@@ -1,12 +1,14 @@
 """Splitting: the probability of a rare fall of a score, by flights that branch off from those that came near it.
 
-Subset simulation (Au & Beck 2001) over whole flights. A flight is a lineage: a seed, and moments from which on other
-random numbers are drawn. Among the flights below a level, Metropolis-Hastings steps draw all noise again from a moment
-before the level was first crossed, and keep what crosses it again; a share of them lies below the next level.
+Subset simulation (Au & Beck 2001) over whole flights. A flight is a lineage: a seed, and moments
+from which on other random numbers are drawn. Among the flights below a level, Metropolis-Hastings
+steps draw all noise again from a moment before the level was first crossed, and keep what crosses
+it again; a share of them lies below the next level.
 
-This finds and ranks rare flights. As a number it is an estimate with a known weakness: what happens once in a hundred
-flights that start the levels may be what all of the rarest have in common. So repetitions start from different flights,
-and where they disagree with counting, or stem from too few of them, no number is given.
+This finds and ranks rare flights. As a number it is an estimate with a known weakness: what happens
+once in a hundred flights that start the levels may be what all of the rarest have in common. So
+repetitions start from different flights, and where they disagree with counting, or stem from too
+few of them, no number is given.
 """
 
 import math

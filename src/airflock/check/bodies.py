@@ -34,9 +34,10 @@ Motion = dict[str, NDArray[np.float64]]
 def check_body(body: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a body and return a report with one line a truth.
 
-    A motion that is turned or seen in a mirror turns or mirrors its result; at rest the result is finite; a halved time
-    step halves the error; in other units it is the same motion; the rule stays in single precision. A body that
-    rightly breaks one of them says which and why: VIOLATES = {"mirror": "a propeller turns one way"}.
+    A motion that is turned or seen in a mirror turns or mirrors its result; at rest the result is
+    finite; a halved time step halves the error; in other units it is the same motion; the rule
+    stays in single precision. A body that rightly breaks one of them says which and why: VIOLATES =
+    {"mirror": "a propeller turns one way"}.
 
     Parameters
     ----------

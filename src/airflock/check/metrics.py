@@ -35,9 +35,10 @@ FlockTrack = NDArray[np.float64]  # (instant, agent, component): position (m) an
 def check_metric(part: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     """Run the standing list of truths on an order parameter and return a report with one line a truth.
 
-    A flock that is turned, shifted, renumbered or seen in a mirror keeps its order parameters; one agent alone and two
-    in one place give numbers (or nan); in other units each value changes as its unit in REPORTS says. An order
-    parameter that rightly breaks one of them says which and why: VIOLATES = {"mirror": "the sense of rotation"}.
+    A flock that is turned, shifted, renumbered or seen in a mirror keeps its order parameters; one
+    agent alone and two in one place give numbers (or nan); in other units each value changes as its
+    unit in REPORTS says. An order parameter that rightly breaks one of them says which and why:
+    VIOLATES = {"mirror": "the sense of rotation"}.
 
     Parameters
     ----------

@@ -62,10 +62,11 @@ def check_model(
 ) -> Report:
     """Run the standing list of truths on a flocking law and return a report with one line a truth.
 
-    Turned, shifted, renumbered and mirrored scenes must turn, shift, renumber and mirror the command; a lone agent
-    flies straight on; two agents at any distance get finite commands; a halved time step halves the error; a flight in
-    other units is the same flight; no rule leaves single precision. A law that rightly breaks one of them says which
-    and why: VIOLATES = {"mirror": "neighbours are passed on the right"}.
+    Turned, shifted, renumbered and mirrored scenes must turn, shift, renumber and mirror the
+    command; a lone agent flies straight on; two agents at any distance get finite commands; a
+    halved time step halves the error; a flight in other units is the same flight; no rule leaves
+    single precision. A law that rightly breaks one of them says which and why: VIOLATES =
+    {"mirror": "neighbours are passed on the right"}.
 
     Parameters
     ----------

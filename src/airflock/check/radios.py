@@ -30,9 +30,10 @@ SPEEDS = ("vx", "vy", "vz", "evx", "evy", "evz")
 def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a radio and return a report with one line a truth.
 
-    Chances lie between 0 and 1 and delays are not negative; a packet of age 0 is believed as it is; what is
-    shifted is carried on shifted; in other units it is the same radio; rules stay in single precision. A radio that
-    rightly breaks one of them says which and why: VIOLATES = {"place": "a mast stands in the origin"}.
+    Chances lie between 0 and 1 and delays are not negative; a packet of age 0 is believed as it is;
+    what is shifted is carried on shifted; in other units it is the same radio; rules stay in single
+    precision. A radio that rightly breaks one of them says which and why: VIOLATES = {"place": "a
+    mast stands in the origin"}.
 
     Parameters
     ----------

@@ -40,9 +40,10 @@ Track = NDArray[np.float64]  # (measurement, component) true position (m) and ve
 def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a sensor and return a report with one line a truth.
 
-    A track that is shifted is measured shifted; errors stay bounded; where `exact` says so there is no error; in other
-    units it is the same measurement; the rule stays in single precision. A sensor that rightly breaks one of them says
-    which and why: VIOLATES = {"place": "a beacon stands in the origin"}.
+    A track that is shifted is measured shifted; errors stay bounded; where `exact` says so there is
+    no error; in other units it is the same measurement; the rule stays in single precision. A
+    sensor that rightly breaks one of them says which and why: VIOLATES = {"place": "a beacon stands
+    in the origin"}.
 
     Parameters
     ----------

@@ -40,9 +40,10 @@ class Neighbours(NamedTuple):
 def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a topology and return a report with one line a truth.
 
-    Everybody is met or not, and nobody who is not heard; the order of the others does not matter; turned about the
-    vertical it is the same; in other units it is the same; where it says that it is NEAR, nobody farther matters. A
-    topology that rightly breaks one of them says which and why: VIOLATES = {"turned": "whoever is east is met"}.
+    Everybody is met or not, and nobody who is not heard; the order of the others does not matter;
+    turned about the vertical it is the same; in other units it is the same; where it says that it
+    is NEAR, nobody farther matters. A topology that rightly breaks one of them says which and why:
+    VIOLATES = {"turned": "whoever is east is met"}.
 
     Parameters
     ----------

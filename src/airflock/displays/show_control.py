@@ -29,8 +29,9 @@ def assign_points(
     blocked : of each point, whether something stands in its place
     longer  : how much longer (drone, point) a way is than the straight one, m
 
-    With squared ways no two straight ways come nearer than the drones and the points are apart, divided by the root of
-    2, if all take the same time (Turpin, Michael and Kumar 2014). Raises AirflockError for more drones than points.
+    With squared ways no two straight ways come nearer than the drones and the points are apart,
+    divided by the root of 2, if all take the same time (Turpin, Michael and Kumar 2014). Raises
+    AirflockError for more drones than points.
     """
     if len(drones) > len(points):
         raise AirflockError(f"{len(drones)} drones are more than {len(points)} points")

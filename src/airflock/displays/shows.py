@@ -159,7 +159,8 @@ FAILURE_KINDS = ("fall", "hover", "both")
 @dataclass
 class Show:
     """What was flown: each shape's figures; frames (time, 6, drone; nan once failed), the time between them, s, and the
-    last frame of each shape; the scenario, the seed, and the flight, which is one from the first shape to the last.
+    last frame of each shape; the scenario, the seed, and the flight, which is one from the first
+    shape to the last.
     """
 
     shape_reports: list[ShapeReport]

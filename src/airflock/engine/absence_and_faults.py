@@ -1,8 +1,9 @@
 """Absent agents, empty batteries that have come down, and faults that begin or change between two steps.
 
-A driver flies the first n agents of its tables. An agent that leaves is put behind them, with all rows, packets and
-memories, and n is one less: nobody meets, hears, feels, measures or counts it, and no loop has a test for it. An
-instant is then that of a smaller flock, as in a recording with gaps (`measuring.measure_frames`).
+A driver flies the first n agents of its tables. An agent that leaves is put behind them, with all
+rows, packets and memories, and n is one less: nobody meets, hears, feels, measures or counts it,
+and no loop has a test for it. An instant is then that of a smaller flock, as in a recording with
+gaps (`measuring.measure_frames`).
 """
 
 from collections.abc import Mapping, Sequence

@@ -237,7 +237,8 @@ class DriverState(DriverMemory):
     def compile_in_background(self) -> "DriverState":
         """Have another process compile the driver, and load it; for a thread that may wait. Returns the state.
 
-        Where no process can be started, or it fails for any reason, this thread compiles and says what is wrong.
+        Where no process can be started, or it fails for any reason, this thread compiles and says
+        what is wrong.
         """
         if not is_compiled(self.driver):
             compile_by_process(self.driver, tuple(map(self.driver.advance.typeof_pyval, self.arguments(0, 0))))
@@ -274,7 +275,8 @@ class DriverState(DriverMemory):
         half   : as in `passes.driver.flight`
         frames : (sample, component, agent), filled with the samples of these steps; None keeps none
 
-        It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
+        It stops on the way where a fault is due. What is due at a step is done before it is flown
+        or sensed.
         """
         due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last}) if self.tables.due else []
         if not due:
@@ -358,10 +360,11 @@ def _again(plan: Plan, tables: WorldTables, device: str, start: NDArray[Any], bu
 def hand_over(old: DriverState, new: DriverState, step: int) -> None:
     """Fill `new`, of the same agents and dimensions, with what `old` holds before `step`.
 
-    Rows that only the new plan has are filled from what they stand for: a measured position from the true one, what a
-    fault may repeat from what was believed or heard last. What is under way by radio stays under way. Sums over time
-    start again, what metrics remember of each agent goes on. Pairs are looked at again (`held` is new): the new numbers
-    may call a distance a collision that the old did not.
+    Rows that only the new plan has are filled from what they stand for: a measured position from
+    the true one, what a fault may repeat from what was believed or heard last. What is under way by
+    radio stays under way. Sums over time start again, what metrics remember of each agent goes on.
+    Pairs are looked at again (`held` is new): the new numbers may call a distance a collision that
+    the old did not.
     """
     # Rows are matched by name whether or not the plan is the same: one path instead of two.
     lanes = _lanes(old, new)
@@ -394,7 +397,8 @@ def hand_over(old: DriverState, new: DriverState, step: int) -> None:
 def _lanes(old: DriverState, new: DriverState) -> NDArray[np.int64]:
     """Of each lane of the new driver the lane that it takes over; agents that are absent come last.
 
-    A driver that sorts agents by cells may find them in any order; the others have them in the order of their numbers.
+    A driver that sorts agents by cells may find them in any order; the others have them in the
+    order of their numbers.
     """
     found = np.arange(new.arrays["work"].shape[1])
     if old.slots is not None and not sorts_by_cells(new.plan):
@@ -442,9 +446,10 @@ def _goes_on(row: str, old: Plan, new: Plan) -> bool:
 def _under_way(old: DriverState, new: DriverState, step: int, lanes: NDArray[np.int64]) -> NDArray[Any]:
     """The ring of past states for the delay of the new plan, (slot, component, lane).
 
-    Decision k hears slot k modulo the ring, the states of step k * decide_every - delay. With a shorter delay newer
-    states replace what was under way in time; with a longer one the last packet is heard again meanwhile. Beside states
-    lie the faults by which they were sent; where none are kept yet, those of now stand in.
+    Decision k hears slot k modulo the ring, the states of step k * decide_every - delay. With a
+    shorter delay newer states replace what was under way in time; with a longer one the last packet
+    is heard again meanwhile. Beside states lie the faults by which they were sent; where none are
+    kept yet, those of now stand in.
     """
     past, every = old.arrays["past"][..., lanes], old.whole("decide_every")
     made = np.empty_like(new.arrays["past"])

@@ -533,10 +533,11 @@ class FlightObservations:
     def look(self, agent: int) -> AgentView:
         """Return the percept of an agent, and the parts of its command.
 
-        Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
+        Before a decision (`decides`), what it would decide on now; otherwise what its last decision
+        was made from.
 
-        Raises FlightError for an agent that is not there, and RuleError for a rule that needs what is not known
-        outside of the flight.
+        Raises FlightError for an agent that is not there, and RuleError for a rule that needs what
+        is not known outside of the flight.
 
         Examples
         --------
@@ -614,7 +615,8 @@ class FlightActions(FlightObservations):
         value : one number per axis, m/s, m/s² or a direction, as the law commands; for several agents one such row
                 for all of them, or one for each: (agent, axis)
 
-        Raises FlightError for an agent that is not there, for another number of numbers, and where `sense` does.
+        Raises FlightError for an agent that is not there, for another number of numbers, and where
+        `sense` does.
 
         Examples
         --------
@@ -633,10 +635,11 @@ class FlightActions(FlightObservations):
     def change(self, settings: Mapping[str, Any], *, wait: bool = True) -> Self:
         """Change keys of the scenario by `settings`, such as {"model.p_rep": 0.2}; from the next step or decision on.
 
-        Everything that a scenario file says may change but agents, dimensions, dt and start. A new window of scores
-        begins. Where other text must be compiled, `wait` says whether to wait for it; if not, the flight goes on under
-        the old scenario until the next `advance` after the new one is ready.
-        Raises ScenarioError, or FlightError once the flight has ended; the flight is as it was.
+        Everything that a scenario file says may change but agents, dimensions, dt and start. A new
+        window of scores begins. Where other text must be compiled, `wait` says whether to wait for
+        it; if not, the flight goes on under the old scenario until the next `advance` after the new
+        one is ready. Raises ScenarioError, or FlightError once the flight has ended; the flight is
+        as it was.
 
         Examples
         --------
@@ -660,7 +663,8 @@ class FlightActions(FlightObservations):
 
         velocity : m/s, one number per axis, at most 1000; for several agents one such row for all, or one for each
 
-        Raises FlightError for an agent that is not there, and for a velocity that is none or too large.
+        Raises FlightError for an agent that is not there, and for a velocity that is none or too
+        large.
 
         Examples
         --------
@@ -683,7 +687,8 @@ class FlightActions(FlightObservations):
 
         position : m, one number per axis, up to 1e6; for several agents one row for each: (agent, axis)
 
-        Raises FlightError for a place inside what stands in the scene. A periodic box holds every place.
+        Raises FlightError for a place inside what stands in the scene. A periodic box holds every
+        place.
 
         Examples
         --------
@@ -819,8 +824,9 @@ def flight_html(flight: "Flight") -> str:
 class Flight(FlightActions):
     """One flight of a scenario, open: it goes on at each call of `advance`, and may be changed on its way.
 
-    Its bits are those of the closed flight, whatever the parts in which it is advanced. A change is a scenario: checked
-    whole, in force from the next step or decision on, and the beginning of a new window of scores.
+    Its bits are those of the closed flight, whatever the parts in which it is advanced. A change is
+    a scenario: checked whole, in force from the next step or decision on, and the beginning of a
+    new window of scores.
 
     scenario  : a Scenario, the name of a preset or a scenario file
     seed      : any integer from 0 to 2^64 - 1; the same seed gives the same bits
@@ -905,8 +911,8 @@ class Flight(FlightActions):
 
         seconds : time to fly, s; steps: or motion steps
 
-        Raises FlightError where the flight is over, where the agents find no place at the start, and where a state
-        stops being finite.
+        Raises FlightError where the flight is over, where the agents find no place at the start,
+        and where a state stops being finite.
 
         Examples
         --------
@@ -986,7 +992,8 @@ class Flight(FlightActions):
 
         kind : change, fault, push, place, command, remove, add or branch; data : the arguments of that method
 
-        Raises FlightError for an event that there is not, and what the method raises, such as ScenarioError.
+        Raises FlightError for an event that there is not, and what the method raises, such as
+        ScenarioError.
 
         Examples
         --------
@@ -1062,8 +1069,8 @@ class Flight(FlightActions):
     def again(self) -> "Flight":
         """Return this flight from its start, with the same events to come.
 
-        Raises ScenarioError, FlightError and ParameterError as opening it did; so only where files have changed
-        meanwhile.
+        Raises ScenarioError, FlightError and ParameterError as opening it did; so only where files
+        have changed meanwhile.
 
         Examples
         --------

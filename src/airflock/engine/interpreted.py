@@ -1,8 +1,9 @@
 """Interpreted drivers: the stages of a driver, the very text that is compiled, run as plain Python.
 
-Nothing is compiled and nothing is copied: the stages call the authors' own functions, with ordinary floats in their
-hands and with parameters that carry their choices, so that a breakpoint in a rule stops, and so does one in a stage.
-The text lies in a file of the driver cache (`__file__` of the driver), where a debugger finds it.
+Nothing is compiled and nothing is copied: the stages call the authors' own functions, with ordinary
+floats in their hands and with parameters that carry their choices, so that a breakpoint in a rule
+stops, and so does one in a stage. The text lies in a file of the driver cache (`__file__` of the
+driver), where a debugger finds it.
 """
 
 import hashlib
@@ -36,7 +37,8 @@ Set breakpoints at will; changes have no effect. Rules are functions of their ow
 class PlainTable(dict[int, Any]):
     """A table of a driver that hands out plain numbers: row by row, or element by element. It writes through.
 
-    As a dictionary of the rows that were asked for: whatever a stage reads, it reads its rows first.
+    As a dictionary of the rows that were asked for: whatever a stage reads, it reads its rows
+    first.
     """
 
     def __init__(self, array: NDArray[Any]):
@@ -165,8 +167,8 @@ def _driver(build: Builder, label: str, lanes: str, exact: bool) -> ModuleType:
 def _skipping(text: str) -> str:
     """Return the text with loops over pairs that skip a pair whose result is not selected.
 
-    Whatever follows `ok` in a loop goes through `choose(ok, ..., START)`, and START changes no total. Where another
-    agent of the same loop is still to come, nothing is skipped.
+    Whatever follows `ok` in a loop goes through `choose(ok, ..., START)`, and START changes no
+    total. Where another agent of the same loop is still to come, nothing is skipped.
     """
     lines = text.splitlines()
     found = []

@@ -1,9 +1,9 @@
 """Modules of the compiler, kept out of the garbage collector's way for as long as the process runs.
 
-Numba brings 130,000 objects, with the code of a first driver. A full collection looks at each of them, which takes a
-tenth of a second and halts every thread: a flight beside a compiler, a live page, a node. Python has a place for what
-is never to be looked at again. A program with many objects of its own waits for these anyway, and may drop some later:
-there all stay where they are.
+Numba brings 130,000 objects, with the code of a first driver. A full collection looks at each of
+them, which takes a tenth of a second and halts every thread: a flight beside a compiler, a live
+page, a node. Python has a place for what is never to be looked at again. A program with many
+objects of its own waits for these anyway, and may drop some later: there all stay where they are.
 """
 
 import gc

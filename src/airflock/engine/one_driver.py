@@ -1,7 +1,8 @@
 """One driver compiled and kept by a process of its own; `engine.store` starts it. No module imports it.
 
-The request comes by standard input: the text of a driver, which holds every rule, so that no file of
-anybody's is run. The input stays open; its end means that the process that sent the request has gone.
+The request comes by standard input: the text of a driver, which holds every rule, so that no file
+of anybody's is run. The input stays open; its end means that the process that sent the request has
+gone.
 """
 
 import json

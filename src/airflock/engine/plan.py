@@ -272,7 +272,8 @@ class Plan(PlanProperties):
     def sent_faults(self) -> tuple[tuple[int, str, str], ...]:
         """Columns of faults that lie in the ring beside the state that is sent: place, kind, and which of its numbers.
 
-        What is heard was sent a delay ago, by the faults and the clock of then, whatever has begun or ended since.
+        What is heard was sent a delay ago, by the faults and the clock of then, whatever has begun
+        or ended since.
         """
         rules = ("clock",) if self.sees else ("sense", "tell", "clock")
         kinds = self.suffers(*rules) if self.late else ()
@@ -352,8 +353,8 @@ class Plan(PlanProperties):
     def of_pair(self) -> tuple[float, ...]:
         """Return the initial record of a pair, before anything was sent.
 
-        Position, velocity and time stamp of the newest packet; where packets come late, the same of the one under way
-        and when it is due (GONE: none is under way); the radio's Packet.
+        Position, velocity and time stamp of the newest packet; where packets come late, the same of
+        the one under way and when it is due (GONE: none is under way); the radio's Packet.
         """
         packet = (*(0.0,) * (2 * self.dimensions), NO_PACKET_TIME)
         under_way = (*packet, GONE) if self.radio.late is not None else ()

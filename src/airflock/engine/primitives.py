@@ -1,7 +1,8 @@
 """Random primitives for a CPU, as driver text: the arithmetic of `core.random` in machine words.
 
-The integers are identical to the plain form. The normal numbers use polynomials for logarithm, sine and cosine instead
-of the C library, whose scalar calls would stop vectorisation; they agree with the plain form to rounding.
+The integers are identical to the plain form. The normal numbers use polynomials for logarithm, sine
+and cosine instead of the C library, whose scalar calls would stop vectorisation; they agree with
+the plain form to rounding.
 """
 
 from airflock.engine import vectors

@@ -1,7 +1,8 @@
 """Schedule: the order of a step, which every driver reads.
 
-A step of a flight is a row of events. Each has stages, which run one after another, and is due at every step or at
-every so-manieth. `stages.flight` is the same as a function; kernels and cells take their stages from here.
+A step of a flight is a row of events. Each has stages, which run one after another, and is due at
+every step or at every so-manieth. `stages.flight` is the same as a function; kernels and cells take
+their stages from here.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,9 +1,9 @@
 """Drivers on disk: one folder per content hash, so that no cache can ever serve stale physics.
 
-The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of the compiler, our
-own passes of it and the processor. What runs is always the text that was generated, never a file's; compiled code is
-loaded only under a seal (`numba_private.sealed_cache`), from a folder that belongs to the user alone
-(`airflock.support.cache`).
+The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of
+the compiler, our own passes of it and the processor. What runs is always the text that was
+generated, never a file's; compiled code is loaded only under a seal (`numba_private.sealed_cache`),
+from a folder that belongs to the user alone (`airflock.support.cache`).
 """
 
 import hashlib
@@ -109,7 +109,8 @@ def _compiled_by_process(module: ModuleType, compile_: Callable[[Any], Any]) -> 
 def compile_by_process(driver: ModuleType, types: tuple[Any, ...]) -> None:
     """Have another process compile a driver for these argument types, and keep it; wait for its end.
 
-    Nothing happens where no process can be started, or it fails for any reason: then this process compiles.
+    Nothing happens where no process can be started, or it fails for any reason: then this process
+    compiles.
     """
     # Numba keeps the interpreter lock for long stretches: compiling in a thread made gaps of 66 to
     # 171 ms in a page of 30 frames a second, a process below 50 ms. It is no fork: threads and LLVM

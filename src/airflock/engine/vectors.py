@@ -1,16 +1,18 @@
 """What lets LLVM use vectors on a CPU, as driver text: extremes, choices without a branch, the width of a vector.
 
-`least` and `most` stand for min and max of two numbers: LLVM vectorises a reduction by its own minimum instruction, but
-not one by the comparison that Numba makes of min (2.4 times on the nearest-neighbour loop). `choose` is a conditional
-expression without a branch: of two branches on one test LLVM makes two ways through a loop, and the extremes at their
-ends are then no reductions any more (9 times on the same loop). `copy_block` copies a few neighbours in a row of one
-contiguous table to another one, plus a shift, as one vector. `wide_vectors` asks for 512-bit vectors in the function
-that calls it, on processors that keep their clock then (`support.machine.vector_bits`): LLVM takes 256 bits by default.
-A driver asks for them on every processor, so that its text is the same on all. `apart` promises that the arguments of
-the function that calls it lie apart in memory: else LLVM compares the places of all rows before each loop, and gives up
-on a loop that writes many. `alone` keeps the function that calls it out of those that call that one. `min` and `max`
-are Numba's of two numbers, and `as_bits` and `as_number` its views of the bits of one, which Numba compiles for each
-kind of number as functions that Python could call.
+`least` and `most` stand for min and max of two numbers: LLVM vectorises a reduction by its own
+minimum instruction, but not one by the comparison that Numba makes of min (2.4 times on the
+nearest-neighbour loop). `choose` is a conditional expression without a branch: of two branches on
+one test LLVM makes two ways through a loop, and the extremes at their ends are then no reductions
+any more (9 times on the same loop). `copy_block` copies a few neighbours in a row of one contiguous
+table to another one, plus a shift, as one vector. `wide_vectors` asks for 512-bit vectors in the
+function that calls it, on processors that keep their clock then (`support.machine.vector_bits`):
+LLVM takes 256 bits by default. A driver asks for them on every processor, so that its text is the
+same on all. `apart` promises that the arguments of the function that calls it lie apart in memory:
+else LLVM compares the places of all rows before each loop, and gives up on a loop that writes many.
+`alone` keeps the function that calls it out of those that call that one. `min` and `max` are
+Numba's of two numbers, and `as_bits` and `as_number` its views of the bits of one, which Numba
+compiles for each kind of number as functions that Python could call.
 """
 
 EXTREME_TEXT = """

@@ -76,8 +76,8 @@ def make_card_document(
     stop_for_lost : whether the rule of silence stops a drone, whatever the scenario says; None: it does, and with
                     as_simulated only where the scenario says so
 
-    Raises CardError where the scenario has no walls, where neighbours are seen instead of heard, or where its law or
-    its topology is not in the package.
+    Raises CardError where the scenario has no walls, where neighbours are seen instead of heard, or
+    where its law or its topology is not in the package.
     """
     _check_flyable(scenario)
     limits = replace(default_safety(scenario), **(safety or {}))

@@ -135,7 +135,8 @@ def divergence(
 ) -> Divergence:
     """Measure how fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
 
-    A nudge moves each agent at the start by 1 cm in a direction of its own; the largest of eight nudges counts.
+    A nudge moves each agent at the start by 1 cm in a direction of its own; the largest of eight
+    nudges counts.
     """
     scenario, dims, n = fleet.scenario, fleet.scenario.dimensions, fleet.scenario.agents
     states = simulated_start(scenario, fleet.seed)

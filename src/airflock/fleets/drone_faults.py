@@ -1,8 +1,8 @@
 """Faults of drones: those that a file injects, and those of the scenario at the times of a simulation.
 
-A vehicle applies them to its navigation, its motors and its motion; the radio channel, to the range between two
-drones; `FaultyNode`, to clock and packets of a node. Each looks them up by the time of the flight, so that on the real
-clock all processes let a fault begin at the same time.
+A vehicle applies them to its navigation, its motors and its motion; the radio channel, to the range
+between two drones; `FaultyNode`, to clock and packets of a node. Each looks them up by the time of
+the flight, so that on the real clock all processes let a fault begin at the same time.
 """
 
 import math

@@ -1,8 +1,8 @@
 """The observer of a fleet on the ground, and the broadcast for it from a radio channel in software.
 
-The observer takes bytes and the clock and sends nothing. It accepts what a member would accept: signed with the
-mission's key, in time, each once, of the same card. A channel in software also reports links and faults
-hold; real radios report neither.
+The observer takes bytes and the clock and sends nothing. It accepts what a member would accept:
+signed with the mission's key, in time, each once, of the same card. A channel in software also
+reports links and faults hold; real radios report neither.
 """
 
 from collections import deque
@@ -119,7 +119,8 @@ class FleetObserver:
     card, key : of the mission
     now, utc  : own clock (s) and Unix time (µs), which advance together
 
-    Attributes: peers, the newest plausible status of each member; notes, the events; refused, datagrams by reason.
+    Attributes: peers, the newest plausible status of each member; notes, the events; refused,
+    datagrams by reason.
     """
 
     def __init__(self, card: FlightCard, key: bytes, *, now: float, utc: int):

@@ -31,7 +31,8 @@ def vehicle_body(
 ) -> dict[str, Any]:
     """Return the settings with the body that the vehicles have: a given one, or of ArduPilot the measured one.
 
-    A preset's own body is that of a paper; a file of one's own, and settings of the body, are meant.
+    A preset's own body is that of a paper; a file of one's own, and settings of the body, are
+    meant.
     """
     if body in VEHICLE_BODIES:
         return {**settings, "body.kind": body}

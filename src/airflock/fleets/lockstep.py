@@ -1,6 +1,7 @@
 """A fleet in lock-step: nodes, vehicles and radio channel on one virtual clock in one process. Equal seeds, equal bits.
 
-At each motion step telemetry and packets that are due arrive, the nodes whose tick it is decide, and vehicles move.
+At each motion step telemetry and packets that are due arrive, the nodes whose tick it is decide,
+and vehicles move.
 """
 
 import hashlib
@@ -141,7 +142,8 @@ def make_vehicle(
 def write_card_and_key(path: Path, card: FlightCard) -> None:
     """Write the card of a fleet in software, and its key beside it, for `airflock watch`.
 
-    Files of an earlier fleet in software are replaced; raises CardError where those of a real mission would be lost.
+    Files of an earlier fleet in software are replaced; raises CardError where those of a real
+    mission would be lost.
     """
     key = path.with_suffix(".key")
     if key.exists() and read_key(key) != SOFTWARE_KEY:

@@ -1,7 +1,8 @@
 """The radio channel: datagrams on their way, by the radio rules of the simulator and with faults. Pure: virtual time.
 
-Packets are lost by the random numbers of the simulator: the same streams with the number of the arrival period and the
-pair, so that a fleet whose packets arrive once per decision loses exactly the packets that the simulated flock loses.
+Packets are lost by the random numbers of the simulator: the same streams with the number of the
+arrival period and the pair, so that a fleet whose packets arrive once per decision loses exactly
+the packets that the simulated flock loses.
 """
 
 import hashlib
@@ -278,7 +279,8 @@ class RadioChannel:
 class FaultyNode:
     """A node with faults of the scenario, used like the node itself.
 
-    Its packets carry the false state and its clock the error that the faults say; all else is left to the node.
+    Its packets carry the false state and its clock the error that the faults say; all else is left
+    to the node.
 
     node        : function that returns the node, called each time: a logging one may take its place
     index       : of the drone among the members

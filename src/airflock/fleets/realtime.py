@@ -1,7 +1,7 @@
 """Fleets on the real clock: as tasks of one process, or as processes that fork from a warm parent.
 
-Processes wait at a barrier: each reports that it is ready, and the clock starts when all have. There is no time-out: a
-process that ends early is named in one line, and ends the fleet.
+Processes wait at a barrier: each reports that it is ready, and the clock starts when all have.
+There is no time-out: a process that ends early is named in one line, and ends the fleet.
 """
 
 import asyncio
@@ -485,7 +485,8 @@ def fly_in_realtime(
     on_done      : called once for each second flown
     watcher      : address that gets every packet and the reports of the channel (`TelemetryBroadcast`)
 
-    Raises ScenarioError for faults that need lock-step, LinkError where a process ends before its time.
+    Raises ScenarioError for faults that need lock-step, LinkError where a process ends before its
+    time.
     """
     errors = lockstep_only_errors(faults)
     if errors:

@@ -1,13 +1,15 @@
 """A vehicle in software: a body of the simulator behind MAVLink, as PX4 or as ArduPilot. Pure: no sockets, no clock.
 
-receive(bytes) takes frames and returns answers; due_telemetry(now) returns what is due; step(now, dt) moves it. Inside
-east-north-up, north-east-down only in frames. It keeps the autopilots' rules that matter to a node: PX4 streams by
-itself, enters OFFBOARD only after a second of setpoints and leaves it COM_OF_LOSS_T after the last; ArduPilot streams
-what was requested since it booted, takes off by command, brakes GUID_TIMEOUT after the last setpoint, and acts
-FS_GCS_TIMEOUT after the last heartbeat of SYSID_MYGCS. Both hold their place where they hover or land by themselves.
+receive(bytes) takes frames and returns answers; due_telemetry(now) returns what is due; step(now,
+dt) moves it. Inside east-north-up, north-east-down only in frames. It keeps the autopilots' rules
+that matter to a node: PX4 streams by itself, enters OFFBOARD only after a second of setpoints and
+leaves it COM_OF_LOSS_T after the last; ArduPilot streams what was requested since it booted, takes
+off by command, brakes GUID_TIMEOUT after the last setpoint, and acts FS_GCS_TIMEOUT after the last
+heartbeat of SYSID_MYGCS. Both hold their place where they hover or land by themselves.
 
-Sources: PX4 user guide, Parameter Reference (not flown); ArduPilot Copter, pages Flight Modes and GCS Failsafe.
-"Measured" in a comment means: in flights and logs of ArduCopter 4.6.0-dev in software in the loop, 27/28 November 2026.
+Sources: PX4 user guide, Parameter Reference (not flown); ArduPilot Copter, pages Flight Modes and
+GCS Failsafe. "Measured" in a comment means: in flights and logs of ArduCopter 4.6.0-dev in software
+in the loop, 27/28 November 2026.
 """
 
 import math

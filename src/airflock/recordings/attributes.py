@@ -1,7 +1,7 @@
 """Attributes of a recording, read as text from outside: the scenario, numbers, the format, the checksum.
 
-Format 1 is that of version 0.1. Format 2 names no file of code: a law of the user's own is its bare name and a hash,
-and `airflock_checksum` shows changes since Airflock wrote the file.
+Format 1 is that of version 0.1. Format 2 names no file of code: a law of the user's own is its bare
+name and a hash, and `airflock_checksum` shows changes since Airflock wrote the file.
 """
 
 import hashlib

@@ -1,8 +1,8 @@
 """The dataset of a recording: its layout, the check of it, its frames, derivatives and nearest images.
 
-A recording is one xarray Dataset, simulated or flown. Dimensions (time, space, keypoint, individual) and the attributes
-fps, time_unit, source_software and ds_type follow the convention of `movement`; velocity and command are Airflock's own
-additions. Local east-north-up, SI units.
+A recording is one xarray Dataset, simulated or flown. Dimensions (time, space, keypoint,
+individual) and the attributes fps, time_unit, source_software and ds_type follow the convention of
+`movement`; velocity and command are Airflock's own additions. Local east-north-up, SI units.
 """
 
 import os
@@ -113,8 +113,9 @@ def check_recording(recording: xr.Dataset, where: str = "recording") -> None:
 def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float, NDArray[np.bool_]]:
     """Return frames (time, component, agent) of position and velocity, the time between frames (s), and presence.
 
-    An agent of which a number is missing (nan) at an instant is not there then: (time, agent). Velocity is
-    differentiated from position, within stretches in which the agent is there, where it is not recorded.
+    An agent of which a number is missing (nan) at an instant is not there then: (time, agent).
+    Velocity is differentiated from position, within stretches in which the agent is there, where it
+    is not recorded.
     """
     check_recording(recording, where)
     order = ("time", "space", "keypoint", "individual")
@@ -159,8 +160,8 @@ Array = NDArray[Any]
 def central_difference(position: Array, times: Array) -> Array:
     """Compute velocity (time, ...), m/s, of positions in m at times in s: central differences, one-sided at both ends.
 
-    Exactly 0 where a position stays the same over the frames that it is taken from: `numpy.gradient` leaves a rounding
-    error there, which is a velocity of 1e-15 m/s with a heading.
+    Exactly 0 where a position stays the same over the frames that it is taken from:
+    `numpy.gradient` leaves a rounding error there, which is a velocity of 1e-15 m/s with a heading.
     """
     found: Array = np.asarray(np.gradient(position, times, axis=0))
     same = position[1:] == position[:-1]

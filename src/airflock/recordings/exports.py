@@ -90,7 +90,8 @@ def to_table(recording: xr.Dataset) -> pd.DataFrame:
 def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
     """Make the table of a PX4 log: `timestamp` in whole microseconds, x north, y east, z down (a plane has z = 0).
 
-    The fields are those of `vehicle_local_position`; commanded velocities are cx, cy, cz in the same axes.
+    The fields are those of `vehicle_local_position`; commanded velocities are cx, cy, cz in the
+    same axes.
     """
     table = to_table(recording)
     found: dict[str, object] = {

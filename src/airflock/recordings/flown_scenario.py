@@ -31,8 +31,8 @@ UNKNOWN = Model(name="unknown", Parameters=_Nothing, command="velocity", decide=
 def power_settings(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return settings that measure the power which a recording's geometry saves; `changed` has priority.
 
-    A law that solves for the wings of the flock flies in a frame that moves with the air; elsewhere forward is the
-    flock's mean heading.
+    A law that solves for the wings of the flock flies in a frame that moves with the air; elsewhere
+    forward is the flock's mean heading.
     """
     law = scenario_of_recording(recording).model
     on_wings = law.flock is not None and law.flock is not descent.flock and "wing" in argument_names(law.flock, "flock")
@@ -45,9 +45,10 @@ def scenario_of_recording(
 ) -> Scenario:
     """Rebuild the scenario of a recording; for a flight log, build one that only defines the metrics.
 
-    A law, a body or a metric set of the user's own is not in the file: the law is unknown then, and the others are the
-    usual ones, unless settings give a file ({"metrics.kind": "mine.py"}), which runs with `trust`. A log brings no
-    arena: it is open unless settings name one, and v_flock is its mean speed.
+    A law, a body or a metric set of the user's own is not in the file: the law is unknown then, and
+    the others are the usual ones, unless settings give a file ({"metrics.kind": "mine.py"}), which
+    runs with `trust`. A log brings no arena: it is open unless settings name one, and v_flock is
+    its mean speed.
     """
     check_format(recording)
     document = scenario_document(recording)

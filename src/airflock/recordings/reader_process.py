@@ -1,11 +1,13 @@
 """Open a file in a process of its own, with limits of time and memory, and get plain arrays back.
 
-HDF5 is a large library in C. A damaged file of 34 kB keeps it busy for ever, and no thread and no Ctrl-C ends it;
-others crash it. Readers of ArduPilot's logs loop without end in some files. `ReaderProcess` is the side of the caller.
-It starts the process at once, so that the process works while the caller still imports.
+HDF5 is a large library in C. A damaged file of 34 kB keeps it busy for ever, and no thread and no
+Ctrl-C ends it; others crash it. Readers of ArduPilot's logs loop without end in some files.
+`ReaderProcess` is the side of the caller. It starts the process at once, so that the process works
+while the caller still imports.
 
-The process gets one line of JSON, its request. It answers with lines of JSON: any number of {"share": of the file that
-has been read}, then {"error": text} or a header of attributes and variables, and after that the bytes of the variables.
+The process gets one line of JSON, its request. It answers with lines of JSON: any number of
+{"share": of the file that has been read}, then {"error": text} or a header of attributes and
+variables, and after that the bytes of the variables.
 """
 
 import json

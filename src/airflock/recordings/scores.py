@@ -240,10 +240,10 @@ def measure_recording(
     """Measure the order parameters of a recording, and their course over time.
 
     Frames are taken every metrics.period, or each one if they are farther apart; collisions every
-    metrics.collision_period. Where a number is missing (nan) the individual is not there: an instant counts with those
-    who are, means over time are means over instants at which at least two are, and the value `present` is the share
-    of individuals and instants that is there. What tracks do not have for want of a length (`undefined_metrics_of`) is
-    left out.
+    metrics.collision_period. Where a number is missing (nan) the individual is not there: an
+    instant counts with those who are, means over time are means over instants at which at least two
+    are, and the value `present` is the share of individuals and instants that is there. What tracks
+    do not have for want of a length (`undefined_metrics_of`) is left out.
     """
     frames, period, present = recording_frames(recording)
     scenario = scenario_of_recording(recording, settings, trust=trust)
@@ -284,9 +284,10 @@ def group_scores(
 ) -> pd.DataFrame:
     """Score groups: a row for all agents, one for each group, and one for each two groups.
 
-    A group is measured as if the others were not there. What is between two groups, `PAIR_METRICS`, stands in rows
-    named "one to other"; an instant counts where both have somebody there. Of a group that is never there all but
-    `present` is nan. Raises RecordingError where the recording's scenario has no groups.
+    A group is measured as if the others were not there. What is between two groups, `PAIR_METRICS`,
+    stands in rows named "one to other"; an instant counts where both have somebody there. Of a
+    group that is never there all but `present` is nan. Raises RecordingError where the recording's
+    scenario has no groups.
     """
     scenario = scenario_of_recording(recording, settings, trust=trust)
     groups = [group for group in scenario.groups if group.agents]
@@ -369,8 +370,9 @@ IN_BODIES = {"r_coll": 0.5, "r_body": 0.5, "r_b": 0.5, "r_safe": 1.0, "r_cluster
 def body_length_settings(length: float) -> dict[str, float]:
     """Return settings that measure distances in lengths of a body.
 
-    Two bodies touch where their centres are half a length apart, and belong together up to five lengths: our choice,
-    since nothing that is published fits all animals. Say `metrics.r_cluster` and the like where you know better.
+    Two bodies touch where their centres are half a length apart, and belong together up to five
+    lengths: our choice, since nothing that is published fits all animals. Say `metrics.r_cluster`
+    and the like where you know better.
 
     Parameters
     ----------
@@ -434,8 +436,9 @@ def nearness_note(recording: xr.Dataset, scenario: Scenario, names: Iterable[str
 class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types here
     """Table of order parameters, a column each; `attrs["units"]` and `attrs["meanings"]` describe them.
 
-    It is a DataFrame in all but its heads in a notebook: below each name stands the unit, and pointing at a name shows
-    the meaning. What pandas makes of it is such a table, too, as long as it keeps the attributes.
+    It is a DataFrame in all but its heads in a notebook: below each name stands the unit, and
+    pointing at a name shows the meaning. What pandas makes of it is such a table, too, as long as
+    it keeps the attributes.
     """
 
     @property

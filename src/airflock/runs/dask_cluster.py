@@ -1,9 +1,10 @@
 """Flights on many machines, through a scheduler of dask.distributed.
 
-Workers hold no state: a task carries the scenario as text, parameters and a seed, and returns order parameters. A
-worker that dies costs only time: its flights are flown again elsewhere, with the same seeds and therefore the same
-results. A flight that goes wrong by itself is a result with a reason, as in one process; one that takes too long is
-tried again on a fresh worker process and then recorded as failed.
+Workers hold no state: a task carries the scenario as text, parameters and a seed, and returns order
+parameters. A worker that dies costs only time: its flights are flown again elsewhere, with the same
+seeds and therefore the same results. A flight that goes wrong by itself is a result with a reason,
+as in one process; one that takes too long is tried again on a fresh worker process and then
+recorded as failed.
 """
 
 import json

@@ -1,8 +1,9 @@
 """Store: every flight of a study, on disk as soon as it has landed, in one SQLite file in WAL mode.
 
-The unit is a flight: its row is committed when it lands, so that a process that is killed loses only flights in the
-air. Nothing depends on the order in which flights land. Readers may look on while a study runs; a second writer is
-refused by a lock that the system gives back however the first one ends.
+The unit is a flight: its row is committed when it lands, so that a process that is killed loses
+only flights in the air. Nothing depends on the order in which flights land. Readers may look on
+while a study runs; a second writer is refused by a lock that the system gives back however the
+first one ends.
 """
 
 import json

@@ -34,8 +34,8 @@ class HasDocument(Protocol):
 def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "study") -> str:
     """Make a study's folder, or check that it holds this very study; likewise for another kind, such as a campaign.
 
-    A fitness of the user's own may have been mended since: flights that are stored are judged by it. Returns a note of
-    that, or "".
+    A fitness of the user's own may have been mended since: flights that are stored are judged by
+    it. Returns a note of that, or "".
 
     Raises StudyError where the folder holds another study, or this one and `resume` is False.
     """

@@ -1,7 +1,8 @@
 """Search space: which parameters vary, between which bounds, and how a point of the unit cube becomes parameters.
 
-An optimiser only sees points in [0, 1]^n. Bounds come from the parameters' declarations; a study file narrows them, or
-sets, ties and orders parameters. Bounds wider than declared are refused: no scenario could hold such a value.
+An optimiser only sees points in [0, 1]^n. Bounds come from the parameters' declarations; a study
+file narrows them, or sets, ties and orders parameters. Bounds wider than declared are refused: no
+scenario could hold such a value.
 """
 
 import math

@@ -1,6 +1,7 @@
 """Seeds and events: the inputs of a flight besides its scenario. The three together give the same bits again.
 
-A seed is the key of the random numbers, two words of 32 bits. An event is a change from outside before one step.
+A seed is the key of the random numbers, two words of 32 bits. An event is a change from outside
+before one step.
 """
 
 import math

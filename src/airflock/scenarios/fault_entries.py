@@ -1,7 +1,7 @@
 """The faults of a scenario: the entries of [[faults]], each checked as a whole, and their onsets in one flight.
 
-An onset is drawn before the flight, from seed, world and the number of its entry: when the fault begins, of which
-agent, and for how long.
+An onset is drawn before the flight, from seed, world and the number of its entry: when the fault
+begins, of which agent, and for how long.
 """
 
 import math
@@ -254,8 +254,8 @@ def merge_onsets(
 ) -> tuple[FaultOnset, ...]:  # fmt: skip
     """Merge the onsets of a flight with those of new entries that come into force before step `now`.
 
-    A fault that has begun goes on if the new entries name it as well, with their numbers, or if its entry stays. A
-    fault that the new entries would have begun earlier does not begin.
+    A fault that has begun goes on if the new entries name it as well, with their numbers, or if its
+    entry stays. A fault that the new entries would have begun earlier does not begin.
 
     lasting : numbers of the entries before that stay as they are
     """

@@ -261,9 +261,9 @@ def extend_document(
 ) -> tuple[dict[str, Any], str]:
     """Merge a document over the file that it extends; return it, and the name of that file ("" for none).
 
-    Keys of the document replace those of the file. Where it names another kind of model, body, sensor, radio, scene,
-    goals or start, that section's other keys are not taken over. Neither are the published values of the file, nor its
-    title.
+    Keys of the document replace those of the file. Where it names another kind of model, body,
+    sensor, radio, scene, goals or start, that section's other keys are not taken over. Neither are
+    the published values of the file, nor its title.
 
     where  : name of the document, for errors
     folder : where files are looked for
@@ -352,7 +352,8 @@ def with_field(
 ) -> tuple[dict[str, Any], Mapping[str, Any], tuple[str, ...], tuple[str, ...]]:
     """Replace world.file by the keys of [world] that the map file stands for.
 
-    It is read when a person loads a scenario, and nowhere else: neither a recording nor an event of one names a file.
+    It is read when a person loads a scenario, and nowhere else: neither a recording nor an event of
+    one names a file.
 
     folder : of the scenario file, where its files are looked for
 

@@ -1,6 +1,7 @@
 """The world of a flight outside a driver: valid places, edges, appearing shapes, goals.
 
-The first half checks starts and goals against the scene; `FlightWorld` and `GoalCourse` serve interpreted flights.
+The first half checks starts and goals against the scene; `FlightWorld` and `GoalCourse` serve
+interpreted flights.
 """
 
 import math

@@ -1,7 +1,8 @@
 """Formats of the files that last: each file carries a number, and an older file is read with its old meaning.
 
-A scenario or study without the key `format` is of format 1, as version 0.1 wrote them. A change that would give an
-older file another meaning raises the number and adds a step to MIGRATIONS; a newer file is refused in one line.
+A scenario or study without the key `format` is of format 1, as version 0.1 wrote them. A change
+that would give an older file another meaning raises the number and adds a step to MIGRATIONS; a
+newer file is refused in one line.
 """
 
 from collections.abc import Callable, Mapping

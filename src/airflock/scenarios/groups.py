@@ -1,7 +1,7 @@
 """The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers.
 
-`read_groups` checks the entries of [[groups]]; `flown_laws` and `agent_values` say by which law and with which
-numbers each agent flies.
+`read_groups` checks the entries of [[groups]]; `flown_laws` and `agent_values` say by which law and
+with which numbers each agent flies.
 """
 
 import re

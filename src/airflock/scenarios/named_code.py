@@ -1,7 +1,8 @@
 """Laws by name, and Python files of the user's own: these run only by consent, and each error in one is one line.
 
-A scenario or a study is data; a file of code that it names runs with all rights of the person who opens it. So it is
-imported only with consent: `trust=True`, `--trust`, or the law itself (`law=`, `--law`).
+A scenario or a study is data; a file of code that it names runs with all rights of the person who
+opens it. So it is imported only with consent: `trust=True`, `--trust`, or the law itself (`law=`,
+`--law`).
 """
 
 import hashlib

@@ -1,7 +1,8 @@
 """Kinds of parts: the law, body, sensor, radio, topology and metric set that a document names or a caller gives.
 
-A section names its part by the key `kind`: one of the package, or a Python file of the user's own, which runs only with
-trust. A part that the caller gives replaces that of the document; giving it is consent to run it.
+A section names its part by the key `kind`: one of the package, or a Python file of the user's own,
+which runs only with trust. A part that the caller gives replaces that of the document; giving it is
+consent to run it.
 """
 
 import os

@@ -45,7 +45,8 @@ Numbers = TypeVar("Numbers")
 class Part(Generic[Rule, Numbers]):
     """A part of a scenario: its rule, and the numbers that it flies with.
 
-    A number can be read of the part itself: `scenario.radio.delay` is `scenario.radio.numbers.delay`.
+    A number can be read of the part itself: `scenario.radio.delay` is
+    `scenario.radio.numbers.delay`.
     """
 
     rule: Rule
@@ -449,8 +450,8 @@ def default_silence(scenario: Scenario) -> SilenceParameters:
 def default_separation(model: Model, parameters: Any, start_record: start.Parameters, world: arena.Parameters) -> float:
     """Return the default of start.separation, m: 2 s of flight at the preferred speed, at least 3 m.
 
-    In a ball, a box or a periodic world agents may start anywhere: 0. Source: authors' program of Vásárhelyi et al.
-    2018.
+    In a ball, a box or a periodic world agents may start anywhere: 0. Source: authors' program of
+    Vásárhelyi et al. 2018.
     """
     if start_record.kind != "arena" or world.edges == "periodic":
         return 0.0

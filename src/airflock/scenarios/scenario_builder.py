@@ -1,7 +1,8 @@
 """Build a scenario from the document of a file or a dict: check it as a whole and report all errors at once.
 
-The order of the work: settings are applied, parts are found, keys expanded and units converted; then each section is
-checked, then sections against each other, groups and faults; at last the notes are collected.
+The order of the work: settings are applied, parts are found, keys expanded and units converted;
+then each section is checked, then sections against each other, groups and faults; at last the notes
+are collected.
 """
 
 from collections.abc import Mapping
@@ -270,9 +271,9 @@ FIXED_KEYS = {"agents": "the number of agents", "dt": "the motion step"}  # keys
 def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = False) -> Scenario:
     """Return the scenario with keys changed, checked as a whole as if it came from a file.
 
-    Parts of the user's own (law, body, sensor, radio, topology and order parameters) stay as they are, unless their
-    kind is changed. The start is not checked again for a flight that has `started`.
-    Raises ScenarioError with one line per error.
+    Parts of the user's own (law, body, sensor, radio, topology and order parameters) stay as they
+    are, unless their kind is changed. The start is not checked again for a flight that has
+    `started`. Raises ScenarioError with one line per error.
     """
     # Building again from the document runs every check; changing records directly would skip those
     # between sections.
@@ -327,8 +328,8 @@ def with_faults_starting(scenario: Scenario, count: int, at: float) -> Scenario:
 def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     """Return the scenario with keys like "model.p_rep" changed, for a flight in the air.
 
-    A flight can take all keys of a scenario file but the number of agents, the dimensions, the motion step and the
-    start. Raises ScenarioError with one line per error.
+    A flight can take all keys of a scenario file but the number of agents, the dimensions, the
+    motion step and the start. Raises ScenarioError with one line per error.
     """
     # Compare after building: a setting may say the same in other units, or change nothing.
     new = rebuilt(scenario, settings, started=True)

@@ -1,7 +1,8 @@
 """Checks of a scenario that take more than one key, after each section was checked alone.
 
-Every check returns lines for a person to read, and none where it has nothing to object to. The records of sections
-come as `parts`, section → record; a record that could not be made is None, and checks that need it are left out.
+Every check returns lines for a person to read, and none where it has nothing to object to. The
+records of sections come as `parts`, section → record; a record that could not be made is None, and
+checks that need it are left out.
 """
 
 import math
@@ -252,7 +253,8 @@ def largest_extension(world: arena.Parameters) -> float:
 def diameter(points: Sequence[tuple[float, float]]) -> float:
     """Return the largest distance between two of the points, m.
 
-    Rotating calipers turn around the convex hull: the farthest corner only moves on, so the walk is linear.
+    Rotating calipers turn around the convex hull: the farthest corner only moves on, so the walk is
+    linear.
     """
     hull = MultiPoint(points).convex_hull
     if hull.is_empty or isinstance(hull, Point):

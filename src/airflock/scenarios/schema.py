@@ -1,7 +1,7 @@
 """Validation: make records from nested dicts, and report all errors at once.
 
-The declarations of the parameters are the schema. Each error is one line: file, key, value, unit, allowed range, and
-the nearest right key for a wrong one.
+The declarations of the parameters are the schema. Each error is one line: file, key, value, unit,
+allowed range, and the nearest right key for a wrong one.
 """
 
 from collections.abc import Mapping, Sequence

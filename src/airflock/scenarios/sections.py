@@ -1,7 +1,8 @@
 """The sections of a scenario in one list.
 
-The tables of a scenario file, the fields of a `Scenario`, the keys of a search space, the records that rules receive
-and the columns of the row that a driver reads are all made from `ORDER`, each by name.
+The tables of a scenario file, the fields of a `Scenario`, the keys of a search space, the records
+that rules receive and the columns of the row that a driver reads are all made from `ORDER`, each by
+name.
 """
 
 from dataclasses import dataclass

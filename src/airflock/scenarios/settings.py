@@ -1,7 +1,8 @@
 """Settings: keys that a caller sets from outside, applied to a document before it is checked.
 
-A key is whole ("radio.delay"), or names a number of a group (`groups.NAME.SECTION.KEY`, a tolerance with `.spread`
-behind it) or of a fault (`faults.KIND.KEY` or `faults.NUMBER.KEY`). Keys by their last word: `short_keys`.
+A key is whole ("radio.delay"), or names a number of a group (`groups.NAME.SECTION.KEY`, a tolerance
+with `.spread` behind it) or of a fault (`faults.KIND.KEY` or `faults.NUMBER.KEY`). Keys by their
+last word: `short_keys`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -170,7 +171,8 @@ def _belongs_to_file(key: str, names: list[str]) -> bool:
 def _group_key_hint(key: str, document: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
     """Return what to write instead of a key without a section: the nearest group, and the word at the end of the key.
 
-    Known are the words that the file writes for the flock or for the group; for any other word the section stays open.
+    Known are the words that the file writes for the flock or for the group; for any other word the
+    section stays open.
     """
     rest, _, word = key.removeprefix(GROUP_PREFIX).rpartition(".")
     group = next(iter(get_close_matches(rest, list(tables), n=1, cutoff=0.5)), "")

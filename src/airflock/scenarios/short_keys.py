@@ -17,8 +17,8 @@ IN_FILES = {
 def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
     """Return last word → whole keys of all sections that have it.
 
-    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives way to a key of the
-    model with the same name.
+    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives
+    way to a key of the model with the same name.
     """
     keys: dict[str, list[str]] = {}
     for section, record in records.items():

@@ -1,7 +1,8 @@
 """Units of a scenario file: people's units become the declared SI units, and a note reports each conversion.
 
-A value may carry its unit as text, `delay = "400 ms"`, or as a table, `delay = { value = 400, unit = "ms" }`.
-A spread is the standard deviation of a manufacturing tolerance, in the unit of its number or as a share of it.
+A value may carry its unit as text, `delay = "400 ms"`, or as a table, `delay = { value = 400, unit
+= "ms" }`. A spread is the standard deviation of a manufacturing tolerance, in the unit of its
+number or as a share of it.
 """
 
 import math

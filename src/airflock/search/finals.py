@@ -1,9 +1,9 @@
 """Finals of a search: the best candidate without its luck, and the ranges of parameters that work.
 
-The best of 15,000 noisy evaluations is the luckiest as much as the best. The final mean of each run and the top
-candidates (of a race, `airflock.search.finals`) fly again on the same fresh seeds, the winner once more on other fresh
-seeds for an unbiased score; working ranges are those of Table S1: where candidates of the search reached at least the
-winner's mean.
+The best of 15,000 noisy evaluations is the luckiest as much as the best. The final mean of each run
+and the top candidates (of a race, `airflock.search.finals`) fly again on the same fresh seeds, the
+winner once more on other fresh seeds for an unbiased score; working ranges are those of Table S1:
+where candidates of the search reached at least the winner's mean.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -131,7 +131,8 @@ def _scored(
 ) -> tuple[list[float], dict[str, tuple[float, float, float]]]:
     """Return the fitness of the winner's flights, one number a seed, and the interval in each of several scenarios.
 
-    Over scenarios it is the mean in all of them on one seed, or that in the scenario whose mean is the worst.
+    Over scenarios it is the mean in all of them on one seed, or that in the scenario whose mean is
+    the worst.
     """
     first, n = study.objectives[0], len(study.scenarios)
     sound = [j for j in range(len(flown) // n) if all(flown[0, j * n + place] is not None for place in range(n))]
@@ -203,7 +204,8 @@ def fly_by_successive_halving(
 ) -> tuple[list[list[float | None]], int]:
     """Let all finalists fly a third of the fresh seeds, the better half the others, the best twice as many again.
 
-    Returns the fitness of all finalists, of each over all its flights, and the index of the best of the last round.
+    Returns the fitness of all finalists, of each over all its flights, and the index of the best of
+    the last round.
     """
     # A third of the seeds for all, the rest for the better half: 660 of 6,208 flights were mostly
     # spent on points that were far behind after 20; the median search went from 243 to 234 s.

@@ -1,7 +1,8 @@
 """Generations of a search: ask the optimiser for candidates, fly those missing in the store, report their losses.
 
-A study that was ended, however roughly, is continued by running it again: the optimiser is fed with the stored flights
-from its first generation on and comes to the very state in which it was left. No state is pickled.
+A study that was ended, however roughly, is continued by running it again: the optimiser is fed with
+the stored flights from its first generation on and comes to the very state in which it was left. No
+state is pickled.
 """
 
 import math
@@ -362,7 +363,8 @@ def run_search(
 ) -> list[NDArray[np.float64]]:
     """Run the search of a study to its end, or to Ctrl-C.
 
-    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if requested.
+    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if
+    requested.
     """
     tally = ProgressTally(total_flights(study), on_progress)
     evaluator = Evaluator(study, store, executor, tally.note)
@@ -424,7 +426,8 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
 def averaged_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
     """Return averages (axis,) of the last half of all means, of the last quarter, and so on.
 
-    On a plateau a mean wanders by chance; the average of many wanders less (Polyak & Juditsky 1992).
+    On a plateau a mean wanders by chance; the average of many wanders less (Polyak & Juditsky
+    1992).
     """
     spans = (max(1, len(means) >> (k + 1)) for k in range(windows))
     return [np.mean(means[-span:], axis=0) for span in spans]
@@ -433,8 +436,8 @@ def averaged_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[N
 def windowed_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
     """Return averages (axis,) of the means in each of so many equal parts of the last half.
 
-    CMA-ES ranks single flights and so ends where most flights are good, which is not where their mean is best if a few
-    are bad: on its way it may pass a better place.
+    CMA-ES ranks single flights and so ends where most flights are good, which is not where their
+    mean is best if a few are bad: on its way it may pass a better place.
     """
     late = np.array(means[len(means) // 2 :])
     return [part.mean(axis=0) for part in np.array_split(late, min(windows, len(late)))] if windows else []

@@ -1,12 +1,13 @@
 """From an optimum to parameters that may be flown: Table S4 of Vásárhelyi et al. 2018, step by step.
 
-The optimum of a fitness tolerates a few collisions. The paper makes it safe by hand, Table S4: more repulsion, more
-alignment, a slower but earlier braking at walls. Each step here flies the same seeds as the one before, so that its
-price in fitness and its gain in distance are differences of pairs.
+The optimum of a fitness tolerates a few collisions. The paper makes it safe by hand, Table S4: more
+repulsion, more alignment, a slower but earlier braking at walls. Each step here flies the same
+seeds as the one before, so that its price in fitness and its gain in distance are differences of
+pairs.
 
-The table is a list of what to try, no more: what widens distances in one arena drives agents into the trees of another.
-So a step stays only if it gains, costs little, and keeps every constraint that held; else half of it is tried, else it
-is undone. What is left is judged on fresh seeds.
+The table is a list of what to try, no more: what widens distances in one arena drives agents into
+the trees of another. So a step stays only if it gains, costs little, and keeps every constraint
+that held; else half of it is tried, else it is undone. What is left is judged on fresh seeds.
 """
 
 import math
@@ -211,7 +212,8 @@ class HardeningCandidate:
     def verify_on_fresh_seeds(self) -> StepResult:
         """Fly the kept set on seeds that chose nothing; undo the last step until all constraints hold.
 
-        Seeds come in rounds, so that a set that breaks much is undone after the first. The optimum flies one round.
+        Seeds come in rounds, so that a set that breaks much is undone after the first. The optimum
+        flies one round.
         """
         before = [self._fly(self.kept[0][1], self.fresh[0])]
         after: list[list[ScoreColumns]] = []

@@ -1,8 +1,8 @@
 """Limits of a search: candidates that keep them come before all that do not, whatever their fitness (Deb 2000).
 
-Of two candidates that keep all limits the fitter is better; of two that do not, the one that breaks them less. By how
-much is counted in standard deviations that are missing to the reliability index of the limit, so that limits of any
-score add up.
+Of two candidates that keep all limits the fitter is better; of two that do not, the one that breaks
+them less. By how much is counted in standard deviations that are missing to the reliability index
+of the limit, so that limits of any score add up.
 """
 
 import math

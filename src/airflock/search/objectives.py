@@ -81,7 +81,8 @@ class Objective:
 def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) -> tuple[float, str, bool]:
     """Call the user's own function for one flight; an error in it becomes nan and one line with its place.
 
-    The last value is True for an error of arithmetic, which a flight may cause; others are rather in the text.
+    The last value is True for an error of arithmetic, which a flight may cause; others are rather
+    in the text.
     """
     try:
         return float(function(values)), "", False

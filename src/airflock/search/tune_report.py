@@ -321,7 +321,8 @@ def default_rows(scenario: Scenario) -> list[ReportRow]:
 def _read(scenario: Scenario) -> set[str]:
     """Return the keys of drones, sensors, radio and wind that a flight of a scenario reads.
 
-    Where groups have numbers of their own, drivers read these by agent: then all keys of the section count as read.
+    Where groups have numbers of their own, drivers read these by agent: then all keys of the
+    section count as read.
     """
     text = driver_text(scenario)
     own = {letter for letter, _ in scenario.varied}

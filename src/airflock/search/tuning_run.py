@@ -75,7 +75,8 @@ class IdentifiedFleet:
 def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> IdentifiedFleet:
     """Return the identified fleet of the folder, or identify it now from the logs.
 
-    Raises StudyError where the folder holds what other logs said, RecordingError or AirflockError for bad logs.
+    Raises StudyError where the folder holds what other logs said, RecordingError or AirflockError
+    for bad logs.
     """
     request = _identify_request(logs, like, heard)
     if (folder / REPORT_FILE).is_file():

@@ -1,8 +1,9 @@
 """Access to a page: a token in the address, then a cookie; every other request is refused.
 
-The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped while the server
-starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders, fields
-and buttons have names for screen readers; folders open by the keyboard; commands can be copied).
+The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped
+while the server starts; the same place gives the page a few lines of its own (keys on a slider do
+not turn the camera; sliders, fields and buttons have names for screen readers; folders open by the
+keyboard; commands can be copied).
 """
 
 import hmac
@@ -74,7 +75,8 @@ def check_access(
     path   : with its query; cookies : the header; name : of the cookie that holds the token
     origin : header with the address of the requesting page, if any; host : header with the address of this page
 
-    A browser sends the cookie also for pages of other ports of the same machine: they are turned away.
+    A browser sends the cookie also for pages of other ports of the same machine: they are turned
+    away.
     """
     try:
         given = parse_qs(urlsplit(path).query).get("token", [""])[0]

@@ -43,7 +43,8 @@ def round_ends(values: NDArray[np.float64]) -> tuple[float, float]:
 def axis_ranges(columns: tuple[NDArray[np.float64], ...]) -> dict[str, tuple[float, float]]:
     """Return the axis ranges that must be sent to a page: always x, and y where the page cannot find it itself.
 
-    That is where a value is missing (nan), and where all are the same but for rounding, as the speeds of fish.
+    That is where a value is missing (nan), and where all are the same but for rounding, as the
+    speeds of fish.
     """
     found = {"x": round_ends(columns[0])}
     values = np.concatenate([column[np.isfinite(column)] for column in columns[1:]])
@@ -58,11 +59,12 @@ def axis_ranges(columns: tuple[NDArray[np.float64], ...]) -> dict[str, tuple[flo
 class Chart:
     """Chart of viser whose axis ranges are set.
 
-    Left alone, the page scales the axis of new values by that of the last ones. A chart that was made while it was
-    hidden, or drawn too slowly, has none yet, and then shows the first second for ever (viser 1.1). An axis that is
-    set is never scaled; setting it draws a new picture, so it is done only where a round end is passed. The other
-    axis scales itself unless a value is not a number, with which it would end nowhere and nothing would be drawn, or
-    all are the same but for rounding, at which the page looks for ticks until its memory is full.
+    Left alone, the page scales the axis of new values by that of the last ones. A chart that was
+    made while it was hidden, or drawn too slowly, has none yet, and then shows the first second for
+    ever (viser 1.1). An axis that is set is never scaled; setting it draws a new picture, so it is
+    done only where a round end is passed. The other axis scales itself unless a value is not a
+    number, with which it would end nowhere and nothing would be drawn, or all are the same but for
+    rounding, at which the page looks for ticks until its memory is full.
     """
 
     def __init__(self, handle: Any):
@@ -493,7 +495,8 @@ def _round_length(length: float) -> float:
 def camera_for_aspect(camera_aim: Mapping[str, Any], aspect: float) -> dict[str, Any]:
     """Move a camera for a page of an aspect (width by height), so that a narrow page sees as far sideways.
 
-    The field of view is that of the height, so the camera of a telephone draws back until the width shows as much.
+    The field of view is that of the height, so the camera of a telephone draws back until the width
+    shows as much.
     """
     if not camera_aim or not 0.0 < aspect < FULL_ASPECT:
         return dict(camera_aim)

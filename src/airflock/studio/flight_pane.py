@@ -231,7 +231,8 @@ def scenario_controls(
     has of its own follow: those that the file names for it, and all of a law of its own.
     usual : spans of sliders by key, as a study of the law has them
 
-    A number that is derived from the rest of the scenario (None) gets no control, nor do lists and texts.
+    A number that is derived from the rest of the scenario (None) gets no control, nor do lists and
+    texts.
     """
     parts = scenario.model.parts
     part_of = {f"model.{name}": f"model: {part}" for part, names in parts.items() for name in names}
@@ -272,7 +273,8 @@ def make_slider(
 ) -> ParameterControl:
     """Make the slider of a number, over a study's span or the declared usual one, widened to hold the value.
 
-    Without either from 0 to 4 times the value, or as far on both sides of 0, within the declared range.
+    Without either from 0 to 4 times the value, or as far on both sides of 0, within the declared
+    range.
     """
     usual = study_span or declared.usual
     low, high = (
@@ -326,7 +328,8 @@ class FlightPane:
     at_once : fly interpreted while the driver is compiled, until `switch_to_compiled` (a recording, a large flock:
               compiled)
 
-    Attributes: preset, the scenario at its start; flight; changed, keys that differ from it with their values.
+    Attributes: preset, the scenario at its start; flight; changed, keys that differ from it with
+    their values.
     """
 
     def __init__(self, origin: FlightSource, seed: int, interpret_first: bool = False):
@@ -362,8 +365,8 @@ class FlightPane:
     def switch_to_compiled(self) -> Snapshot | None:
         """Replace the flight by the compiled one, flown again to here with all events. Return its start.
 
-        From here on, and in what is saved of it, bits are those of the compiled flight. None where nothing is compiled.
-        Raises RuleError.
+        From here on, and in what is saved of it, bits are those of the compiled flight. None where
+        nothing is compiled. Raises RuleError.
         """
         if self._compiled_flight is None:
             return None

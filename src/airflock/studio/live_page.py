@@ -30,8 +30,9 @@ def watch(
 ) -> None:
     """Open a page that flies a scenario live, until Ctrl-C: play it, turn its sliders, save what is found.
 
-    Of a flight card (.json) it shows the fleet that carries it instead, by the packets that its radios hear: where the
-    drones are, their phases, links and faults. It listens only, and can do nothing to them.
+    Of a flight card (.json) it shows the fleet that carries it instead, by the packets that its
+    radios hear: where the drones are, their phases, links and faults. It listens only, and can do
+    nothing to them.
 
     scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again; or of a flight card
     settings : keys like "model.p_rep" with the values that replace the file's
@@ -47,8 +48,8 @@ def watch(
     key      : of a fleet: file of the mission's key; by default beside the card
     say      : called with each line: notes, the address of the page, faults
 
-    Raises ScenarioError for a scenario that cannot be flown, CardError for card, key and radios of a fleet, and
-    StudioError for a port in use, one line each.
+    Raises ScenarioError for a scenario that cannot be flown, CardError for card, key and radios of
+    a fleet, and StudioError for a port in use, one line each.
 
     Returns
     -------
@@ -146,7 +147,8 @@ def watch_fleet(
 ) -> None:  # fmt: skip
     """Open a page that shows the fleet of a flight card by what its radios hear, until Ctrl-C. It sends nothing.
 
-    Raises CardError for card, key and radios, all faults at once, and StudioError for a port in use.
+    Raises CardError for card, key and radios, all faults at once, and StudioError for a port in
+    use.
     """
     flight_card, secret, heard = open_card_and_radios(expand_path(card), expand_path(key) if key else None, radios)
     try:

@@ -811,7 +811,8 @@ class PerceptLines:
     ) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
         """Return arrows of the law's terms: of all neighbours, of each, and of all surfaces.
 
-        Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
+        Terms of a law have units of their own, so each is as long as it is beside the strongest of
+        its kind so far.
         """
         pieces, tones, words = [], [], []
         for number, (name, vector, parts) in enumerate(_named_vectors(seen, model)):
@@ -860,8 +861,8 @@ class PerceptLines:
 def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
     """Return the law's vectors by its own words: each with the part of each neighbour; then the surfaces.
 
-    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour of equal velocity
-    would cause, too, and alignment, which is the rest.
+    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour
+    of equal velocity would cause, too, and alignment, which is the rest.
     """
     found: list[tuple[str, NDArray[Any], list[NDArray[Any]]]] = []
     for name, vector in (vector_values(view.sums) if view.sums else {}).items():

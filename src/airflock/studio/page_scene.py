@@ -47,8 +47,9 @@ class Collision(NamedTuple):
 class CollisionList:
     """All collisions up to now, as a page saw them from frame to frame.
 
-    A pair that stays near is one collision. What lies ahead of an earlier moment is forgotten when the flight goes back
-    to it, for another future may follow; a pair that touches again is a collision again.
+    A pair that stays near is one collision. What lies ahead of an earlier moment is forgotten when
+    the flight goes back to it, for another future may follow; a pair that touches again is a
+    collision again.
     """
 
     def __init__(self) -> None:

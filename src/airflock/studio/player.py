@@ -162,8 +162,8 @@ class FlightRequest:
 class ComparedFlights:
     """One flight of a scenario, or two side by side. They have no clock: `Player` flies them.
 
-    Attributes: origins, where they come from; sides, as they fly; hand, which of them the controls act on; note, what
-    was done last, for the page; fault, called with everything that was refused.
+    Attributes: origins, where they come from; sides, as they fly; hand, which of them the controls
+    act on; note, what was done last, for the page; fault, called with everything that was refused.
     """
 
     def __init__(self, request: FlightRequest):
@@ -358,7 +358,8 @@ class Player(ComparedFlights):
 
     `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
 
-    Attributes: pace, how fast they fly; moments, to go back to; paused; failure, why they stopped, or nothing.
+    Attributes: pace, how fast they fly; moments, to go back to; paused; failure, why they stopped,
+    or nothing.
     """
 
     def __init__(self, request: FlightRequest):

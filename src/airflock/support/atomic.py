@@ -1,7 +1,8 @@
 """Files that are complete or not there at all: a temporary name in the same folder, then a rename.
 
-A process that is killed leaves its temporary file. It had a lock on it, which the system has released: so the next
-process that writes into the folder sees that nobody needs it, and removes it. The suffix of a file names its format.
+A process that is killed leaves its temporary file. It had a lock on it, which the system has
+released: so the next process that writes into the folder sees that nobody needs it, and removes it.
+The suffix of a file names its format.
 """
 
 import os
@@ -26,8 +27,9 @@ FOUND = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path with the same ending to write to; it takes the final name only if the block succeeds.
 
-    A link is followed: the file that it names is replaced, not the link. Raises OSError, which names the path, where
-    it is that of something other than a file, such as a named pipe, and for every error while it is written.
+    A link is followed: the file that it names is replaced, not the link. Raises OSError, which
+    names the path, where it is that of something other than a file, such as a named pipe, and for
+    every error while it is written.
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
@@ -75,7 +77,8 @@ def _let_go(handle: int) -> int:
 def write_file(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
     """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place.
 
-    A memoryview is released in any case: Python 3.12 crashes where an error holds one of a BytesIO that has gone.
+    A memoryview is released in any case: Python 3.12 crashes where an error holds one of a BytesIO
+    that has gone.
     """
     with content if isinstance(content, memoryview) else nullcontext(), atomic_path(path) as temporary:
         if isinstance(content, memoryview):

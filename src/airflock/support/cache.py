@@ -1,6 +1,7 @@
 """The cache: a folder that belongs to the user alone, for compiled drivers and studies behind papers.
 
-`AIRFLOCK_CACHE` names another place than the user's cache folder. The least recently used drivers go first.
+`AIRFLOCK_CACHE` names another place than the user's cache folder. The least recently used drivers
+go first.
 """
 
 import atexit

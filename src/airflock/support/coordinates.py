@@ -1,7 +1,8 @@
 """Coordinates: latitude and longitude to metres about a site, and north-east-down to east-north-up.
 
-The local plane touches the WGS 84 ellipsoid at the site; a degree has the length that it has there. Within 1 km of
-the site and below 70° of latitude that is off the true tangent plane by less than 0.5 m, equally for all drones.
+The local plane touches the WGS 84 ellipsoid at the site; a degree has the length that it has there.
+Within 1 km of the site and below 70° of latitude that is off the true tangent plane by less than
+0.5 m, equally for all drones.
 """
 
 import math

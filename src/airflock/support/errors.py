@@ -140,8 +140,8 @@ def invalid_if(dependency: Any, value: T) -> T:
 class ErrorCollector:
     """Collect all validation errors of a request, then raise them together.
 
-    A part is left out where one that it depends on is invalid, and only there. After `raise_errors` has returned, every
-    part is what its reader made.
+    A part is left out where one that it depends on is invalid, and only there. After `raise_errors`
+    has returned, every part is what its reader made.
 
     errors : errors so far, one line each
     """

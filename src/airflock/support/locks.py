@@ -1,7 +1,7 @@
 """Locks on open files, one holder at a time; the system releases them however the holder ends.
 
-POSIX locks the whole file with `flock`; Windows locks one byte with `msvcrt`, far beyond the end of every file of
-ours, so that others may still read it. Nothing waits here. Windows was not run by us.
+POSIX locks the whole file with `flock`; Windows locks one byte with `msvcrt`, far beyond the end of
+every file of ours, so that others may still read it. Nothing waits here. Windows was not run by us.
 """
 
 import errno
@@ -19,7 +19,8 @@ BYTE = 1 << 30  # which byte is locked, where it is bytes that are locked
 def lock(handle: int) -> None:
     """Lock an open file for this handle, until it is closed.
 
-    Raises BlockingIOError where another process has it, and another OSError where the file system knows no locks.
+    Raises BlockingIOError where another process has it, and another OSError where the file system
+    knows no locks.
     """
     if fcntl is not None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -24,8 +24,8 @@ def processor_name() -> str:
 def target() -> tuple[str, frozenset[str]]:
     """Return the kind of processor for which drivers are compiled, such as znver4, and its features, such as avx2.
 
-    They are those of this machine unless NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name others. Everything that depends
-    on a processor is decided by these two.
+    They are those of this machine unless NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name others.
+    Everything that depends on a processor is decided by these two.
     """
     import llvmlite.binding as llvm
     from numba import config

@@ -32,8 +32,9 @@ def run_in_threads(
 ) -> Iterator[Any]:
     """Yield results of jobs in their order, computed by several threads (compiled flights release the interpreter).
 
-    `on_done` is called after each. Ctrl-C abandons the running flights at any moment: this thread shares no lock of
-    Python's with the others, which an interruption between taking and releasing would leave taken (futures have one).
+    `on_done` is called after each. Ctrl-C abandons the running flights at any moment: this thread
+    shares no lock of Python's with the others, which an interruption between taking and releasing
+    would leave taken (futures have one).
     """
     workers = max(1, min(threads or available_cores(), len(jobs)))
     if workers == 1:
@@ -94,8 +95,8 @@ def _work(
 def run_in_background(work: Callable[[], Any]) -> Future[Any]:
     """Run some work in a thread of its own, which ends with the program.
 
-    It begins when the caller goes on: a thread that begins at once keeps the interpreter, and its caller waiting, for
-    5 ms.
+    It begins when the caller goes on: a thread that begins at once keeps the interpreter, and its
+    caller waiting, for 5 ms.
     """
     future: Future[Any] = Future()
     released = Event()

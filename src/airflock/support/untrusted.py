@@ -1,8 +1,9 @@
 """The one entrance for text from outside: files, attributes, rows and options are measured before they are parsed.
 
-A stranger's text may be too large, nested too deeply, or of numbers without end; parsers then take minutes or
-gigabytes, or raise any exception. Here the size, the nesting (dotted keys count, too) and the digits are bounded
-first, and `as_error` turns every later exception into one line that names the source of the text.
+A stranger's text may be too large, nested too deeply, or of numbers without end; parsers then take
+minutes or gigabytes, or raise any exception. Here the size, the nesting (dotted keys count, too)
+and the digits are bounded first, and `as_error` turns every later exception into one line that
+names the source of the text.
 """
 
 import json
@@ -198,7 +199,8 @@ class Element(NamedTuple):
 def parse_xml(text: str) -> Element:
     """Parse an XML text; return its outermost element. Raises FormatError where it is none, TextError beyond bounds.
 
-    A document type is refused before anything of it is read, so that no entity is ever defined, expanded or fetched.
+    A document type is refused before anything of it is read, so that no entity is ever defined,
+    expanded or fetched.
     """
     if len(text) > MAX_BYTES:
         raise TextError(f"is larger than {MAX_BYTES / 1e6:g} MB, more than any text of this kind needs")

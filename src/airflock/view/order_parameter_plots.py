@@ -51,8 +51,9 @@ def series(
     ax          : axes of a grid, whose place the panels take, instead of a new figure
     The picture is that of Vásárhelyi et al. 2018, Fig. 3.
 
-    Raises RecordingError for what is no recording, and for a window that holds none of it, ScenarioError for settings
-    that its scenario does not take, and AirflockError for an `ax` that is none of a grid or a `smooth` below 0.
+    Raises RecordingError for what is no recording, and for a window that holds none of it,
+    ScenarioError for settings that its scenario does not take, and AirflockError for an `ax` that
+    is none of a grid or a `smooth` below 0.
 
     Examples
     --------
@@ -168,8 +169,8 @@ def rotations(
     flights     : label → recording, (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; ax : axes to draw into, instead of a new figure
 
-    Raises RecordingError for what is no recording, and for a window that holds none of it, and for tracks, which have
-    no phi_lap; AirflockError for an unfit `ax`.
+    Raises RecordingError for what is no recording, and for a window that holds none of it, and for
+    tracks, which have no phi_lap; AirflockError for an unfit `ax`.
 
     Examples
     --------
@@ -225,8 +226,9 @@ def flocked(
     ax          : axes of a grid, whose place the panels take, instead of a new figure
     The order parameters are those of Kidger, section 5.1.
 
-    Raises RecordingError for what is no recording, and for a window that holds none of it, or whose order parameters do
-    not hold the share flocked; AirflockError for an `ax` that is none of a grid.
+    Raises RecordingError for what is no recording, and for a window that holds none of it, or whose
+    order parameters do not hold the share flocked; AirflockError for an `ax` that is none of a
+    grid.
 
     Examples
     --------

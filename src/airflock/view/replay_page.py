@@ -473,8 +473,9 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
     -------
     The page: `save(path)` writes it as one HTML file, `text` holds it, and a notebook shows it.
 
-    Raises RecordingError for a colour that the recording does not know, and for a rate that is none; ScenarioError and
-    FlightError where the scenario that it carries cannot be read or flown again.
+    Raises RecordingError for a colour that the recording does not know, and for a rate that is
+    none; ScenarioError and FlightError where the scenario that it carries cannot be read or flown
+    again.
 
     Examples
     --------

@@ -75,7 +75,8 @@ def _bounds(axes: Axes, certificate: "Certificate") -> None:
 def _distances(axes: Axes, certificate: "Certificate") -> None:
     """Draw the share of flights whose smallest distance was below a value; dashed: limits on it.
 
-    Dotted: the tail as extreme value theory extrapolates it (`extrapolated_tail`), to look at; no bound comes from it.
+    Dotted: the tail as extreme value theory extrapolates it (`extrapolated_tail`), to look at; no
+    bound comes from it.
     """
     from_rows = [row.get("closest") if row.get("closest") is not None else row["r_min"] for row in certificate.rows]
     values = np.sort(np.array(from_rows, float))
@@ -100,8 +101,9 @@ def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float6
 
     distances : smallest one of each flight, growing
 
-    A generalised Pareto distribution of how far the lowest fifth fall below its end, by moments (Hosking & Wallis
-    1987). Nearer than anybody came other causes may rule, of which it knows nothing. None of fewer than 100 flights.
+    A generalised Pareto distribution of how far the lowest fifth fall below its end, by moments
+    (Hosking & Wallis 1987). Nearer than anybody came other causes may rule, of which it knows
+    nothing. None of fewer than 100 flights.
     """
     few = len(distances) // 5
     if few < 20:
@@ -380,7 +382,8 @@ MAX_LAWS = 5  # laws that are drawn
 def plot_inferred(result: InferResult, *, ax: Axes | None = None) -> Figure:
     """Plot force maps, the tracks' first and then each law's, best first: along the heading above, to the left below.
 
-    Katz et al., PNAS 108, 18720 (2011). A law that acts by velocities alone, such as alignment, shows no map.
+    Katz et al., PNAS 108, 18720 (2011). A law that acts by velocities alone, such as alignment,
+    shows no map.
     """
     laws = result.laws[:MAX_LAWS]
     columns = [("tracks", laws[0].maps.seen, laws[0].maps.edges)] + [(w.name, w.maps.law, w.maps.edges) for w in laws]
@@ -422,8 +425,8 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
     bins  : of distance; ax : axes of a grid, whose place the panels take, instead of a new figure
     The picture is that of Vásárhelyi et al. 2018, Fig. 8.
 
-    Raises RecordingError where the recording holds no ages or the table lacks a column, and AirflockError for an `ax`
-    that is none of a grid.
+    Raises RecordingError where the recording holds no ages or the table lacks a column, and
+    AirflockError for an `ax` that is none of a grid.
 
     Examples
     --------

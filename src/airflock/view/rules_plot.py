@@ -1,7 +1,8 @@
 """Plots of a law's own parts: its rules against distance, and the wash of its wings.
 
-Rules are drawn against distance (Vásárhelyi et al. 2018, Fig. 6), named as the law names them.
-A law whose neighbours act through several terms (TERMS, or several vectors among its Sums) gets a panel for each.
+Rules are drawn against distance (Vásárhelyi et al. 2018, Fig. 6), named as the law names them. A
+law whose neighbours act through several terms (TERMS, or several vectors among its Sums) gets a
+panel for each.
 """
 
 import math
@@ -154,7 +155,8 @@ def rules(
     ax         : axes of a grid, whose place the panels take, instead of a new figure
     The picture is that of Vásárhelyi et al. 2018, Fig. 6.
 
-    Raises RuleError for a law without a rule of distance, and AirflockError for an `ax` that is none of a grid.
+    Raises RuleError for a law without a rule of distance, and AirflockError for an `ax` that is
+    none of a grid.
 
     Examples
     --------

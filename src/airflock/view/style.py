@@ -1,8 +1,8 @@
 """Look of all figures: colours that colour-blind readers can separate, quiet axes, informative titles; and their
 files.
 
-Everything is set on the figure at hand; global settings of Matplotlib are neither read on purpose nor changed, but for
-the two of files while one is written (`save`).
+Everything is set on the figure at hand; global settings of Matplotlib are neither read on purpose
+nor changed, but for the two of files while one is written (`save`).
 """
 
 import io
@@ -235,7 +235,8 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
 def print_settings() -> Iterator[None]:
     """Set Matplotlib so that files embed their fonts, as publishers want, and are identical at each run.
 
-    One thread at a time: the settings are those of all of Matplotlib, and are put back as they were.
+    One thread at a time: the settings are those of all of Matplotlib, and are put back as they
+    were.
     """
     with _settings_lock, rc_context(FILE_SETTINGS):
         yield

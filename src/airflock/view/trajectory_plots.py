@@ -57,7 +57,8 @@ def through(
     space       : outlines seen obliquely from above, instead of ground plans
     ax          : axes to draw into, instead of a new figure
 
-    Raises RecordingError for tracks, which have no scene, for a flight in a plane, and for an empty window.
+    Raises RecordingError for tracks, which have no scene, for a flight in a plane, and for an empty
+    window.
 
     Examples
     --------
@@ -195,7 +196,8 @@ def draw_outlines(axes: Any, rows: NDArray[np.float64], view: Projection) -> Non
 def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Return edges of boxes and triangles, rims and four uprights of cylinders, as lines (point, 3) in m.
 
-    Segments are left out: they are the plans of the world's own walls, which `walls` gives with their heights.
+    Segments are left out: they are the plans of the world's own walls, which `walls` gives with
+    their heights.
     """
     lines: list[NDArray[np.float64]] = []
     for r in rows[rows[:, 6] != SEGMENT][:MAX_SHAPES]:
@@ -274,8 +276,8 @@ def trajectories(
     colour      : speed, heading (in the plane) or agent; auto: speed, unless all fly equally fast
     ax          : axes to draw into, in space with projection="3d", instead of a new figure
 
-    Raises RecordingError for what is no recording, and for a window that holds none of it, or without such an agent;
-    AirflockError for an unknown colour.
+    Raises RecordingError for what is no recording, and for a window that holds none of it, or
+    without such an agent; AirflockError for an unknown colour.
 
     Examples
     --------

@@ -1,6 +1,7 @@
 """Video of a flight, MP4 or GIF: agents as darts with short tails, arena, obstacles and a clock.
 
-Frames are drawn one at a time and handed to ffmpeg at once, so that the length of a flight costs no memory.
+Frames are drawn one at a time and handed to ffmpeg at once, so that the length of a flight costs no
+memory.
 """
 
 import math

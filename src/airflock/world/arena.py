@@ -1,7 +1,8 @@
 """Arena: its surfaces, each one a scalar function of a position and four numbers.
 
-A surface function returns the distance (m, negative on the far side) and the unit normal that points to where flying is
-allowed. A driver loops over rows of four numbers; which functions it loops over follows from the shape.
+A surface function returns the distance (m, negative on the far side) and the unit normal that
+points to where flying is allowed. A driver loops over rows of four numbers; which functions it
+loops over follows from the shape.
 """
 
 import math

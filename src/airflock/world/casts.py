@@ -1,7 +1,8 @@
 """Casts: how far a thin ray, or a sphere, travels from a position along a unit vector before it meets a shape.
 
-A ray meets a solid from within at 0. A sphere that already touches a shape meets it at 0 if it comes nearer, and not
-at all if it moves away; otherwise nothing that once came too near could leave again. FAR means that nothing is met.
+A ray meets a solid from within at 0. A sphere that already touches a shape meets it at 0 if it
+comes nearer, and not at all if it moves away; otherwise nothing that once came too near could leave
+again. FAR means that nothing is met.
 """
 
 import math
@@ -112,8 +113,8 @@ def ray_to_shape(x, y, z, ux, uy, uz, shapes, k, start):
 def sphere_to_shape(x, y, z, ux, uy, uz, shapes, k, start, best, radius):
     """Distance (m) that a sphere of this radius (m) travels to row k of the shapes, if shorter than best, else FAR.
 
-    The distance along the way is convex, so Newton's steps from outside approach the contact from before and never
-    pass it; start is any distance before it.
+    The distance along the way is convex, so Newton's steps from outside approach the contact from
+    before and never pass it; start is any distance before it.
     """
     t = start
     for _ in range(STEPS):

@@ -1,7 +1,7 @@
 """Excursion: how far (m) a position lies outside an arena; negative or zero where flying is allowed.
 
-One function per shape, each with the same four numbers and the polygon's edges, so that a driver can bind the one that
-the arena needs.
+One function per shape, each with the same four numbers and the polygon's edges, so that a driver
+can bind the one that the arena needs.
 """
 
 import math

@@ -73,8 +73,8 @@ class Aim(NamedTuple):
 def glide(a, b, time, duration):
     """Coordinate (m) of an agent's own goal on its way from a to b, at rest at both ends (a cubic in time).
 
-    All agents take the same time: then straight ways of an assignment with the least sum of squared lengths keep the
-    agents apart (Turpin, Michael and Kumar 2014).
+    All agents take the same time: then straight ways of an assignment with the least sum of squared
+    lengths keep the agents apart (Turpin, Michael and Kumar 2014).
     """
     u = min(time / max(duration, 1e-6), 1.0)
     return a + (b - a) * u * u * (3.0 - 2.0 * u)
@@ -98,9 +98,10 @@ def pursue(x, y, z, wx, wy, wz, cx, cy, cz, radius, travel):
 def herd(x, y, z, wx, wy, wz, cx, cy, cz, fx, fy, fz, spread, behind, radius, travel):
     """Shepherd at x y z that drives a flock with its centre at c and its farthest agent at f to the point w.
 
-    One step of at most travel (m): behind the farthest agent as seen from the centre while that agent is farther than
-    spread (m) from it, else behind the flock as seen from the point (Strömbom et al. 2014, collecting and driving).
-    The point is reached when the centre is within radius (m) of it.
+    One step of at most travel (m): behind the farthest agent as seen from the centre while that
+    agent is farther than spread (m) from it, else behind the flock as seen from the point (Strömbom
+    et al. 2014, collecting and driving). The point is reached when the centre is within radius (m)
+    of it.
     """
     sx = fx - cx
     sy = fy - cy

@@ -1,9 +1,10 @@
 """Inside: whether a position lies within surfaces that close around it, by how often straight lines leave them.
 
-A line from within a closed surface leaves it once more than it enters it, whichever way it goes. So the number of
-crossings outwards less those inwards (the winding number) is 0 outside and within a cavity, and not 0 inside, also
-where closed bodies overlap or are turned inside out. Two lines of three decide, because one through an edge that two
-triangles share may count it twice: random places in a region that is shut would find each place where a line errs.
+A line from within a closed surface leaves it once more than it enters it, whichever way it goes. So
+the number of crossings outwards less those inwards (the winding number) is 0 outside and within a
+cavity, and not 0 inside, also where closed bodies overlap or are turned inside out. Two lines of
+three decide, because one through an edge that two triangles share may count it twice: random places
+in a region that is shut would find each place where a line errs.
 """
 
 from airflock.core import FAR

@@ -1,7 +1,7 @@
 """Polygons as arenas and as obstacles: any simple polygon, also a concave one, and upright prisms over them.
 
-A polygon is a run of rows `ax ay bx by` (m), its edges in counter-clockwise order, so that its inside lies to the left
-of each edge. An arena is the first `corners` rows. Distances are exact.
+A polygon is a run of rows `ax ay bx by` (m), its edges in counter-clockwise order, so that its
+inside lies to the left of each edge. An arena is the first `corners` rows. Distances are exact.
 """
 
 import math
@@ -89,9 +89,10 @@ def hidden(x, y, qx, qy, edges, corners):
 def wall(x, y, z, edges, e, corners, look):
     """Shill agent of edge e of an arena: it stands at the point of the edge that is closest to the position.
 
-    It acts on positions on the inner side of the edge that can see this point; for others, and beyond `look` (m), the
-    distance is 1e30. The normal is that of the edge; at a re-entrant corner, which is nearest from many sides, it is
-    the direction from the corner. Where both edges of such a corner are nearest there, one of them acts.
+    It acts on positions on the inner side of the edge that can see this point; for others, and
+    beyond `look` (m), the distance is 1e30. The normal is that of the edge; at a re-entrant corner,
+    which is nearest from many sides, it is the direction from the corner. Where both edges of such
+    a corner are nearest there, one of them acts.
     """
     before = corners - 1 if e == 0 else e - 1
     after = 0 if e == corners - 1 else e + 1

@@ -1,7 +1,7 @@
 """Rays: the free distance from a position along a unit vector, as a range finder measures it.
 
-One function per shape of arena with the same arguments, so that a driver can bind the one that the arena needs. Faces
-are seen from inside; 1e30 means that nothing is in the way.
+One function per shape of arena with the same arguments, so that a driver can bind the one that the
+arena needs. Faces are seen from inside; 1e30 means that nothing is in the way.
 """
 
 import math

@@ -1,10 +1,11 @@
 """Shapes of a scene as rows of numbers: boxes, upright cylinders, triangles and upright segments; distances to them.
 
-A row has 18 columns: bounds x0 y0 z0 x1 y1 z1 (m), the kind, up to nine numbers of the kind, the time (s) at which the
-shape appears, and 1.0 if it is part of a surface that closes around an inside. Numbers of the kinds: box and ground
-(none: the bounds say all), cylinder (x, y, radius), triangle (ax ay az bx by bz cx cy cz), segment (ax ay bx by): the
-ground plan of a wall without end in height. Distances are exact: signed for the solids (negative within), unsigned for
-triangles and segments. All shapes are convex, so a distance along a straight line is convex too.
+A row has 18 columns: bounds x0 y0 z0 x1 y1 z1 (m), the kind, up to nine numbers of the kind, the
+time (s) at which the shape appears, and 1.0 if it is part of a surface that closes around an
+inside. Numbers of the kinds: box and ground (none: the bounds say all), cylinder (x, y, radius),
+triangle (ax ay az bx by bz cx cy cz), segment (ax ay bx by): the ground plan of a wall without end
+in height. Distances are exact: signed for the solids (negative within), unsigned for triangles and
+segments. All shapes are convex, so a distance along a straight line is convex too.
 """
 
 import math

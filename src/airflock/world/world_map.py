@@ -1,7 +1,7 @@
 """The map of a world: its outlines, walls, obstacles and shapes, queried at one position.
 
-Plain Python, as a drone carries it. A map is made from the record of an arena and, where a scene stands in it, from
-rows of shapes behind their tree.
+Plain Python, as a drone carries it. A map is made from the record of an arena and, where a scene
+stands in it, from rows of shapes behind their tree.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -121,9 +121,9 @@ def obstacle_rule(world: arena.Parameters) -> Callable[..., Any]:
 def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[list[int]]]:
     """Edges of all polygons (rows ax ay bx by), how many are the arena's, and first and last row of each obstacle.
 
-    A side of the arena that goes straight on over corners is one edge, with one shill agent. Behind the edges of the
-    arena stands the height of its middle where it is `is_off_centre`, behind those of each obstacle its two heights
-    where obstacles have any.
+    A side of the arena that goes straight on over corners is one edge, with one shill agent. Behind
+    the edges of the arena stands the height of its middle where it is `is_off_centre`, behind those
+    of each obstacle its two heights where obstacles have any.
     """
     rows: list[list[float]] = []
     spans = []

@@ -1,7 +1,8 @@
 """Autopilots: modes of PX4 and ArduPilot, the commands that fly them, and the parameters that make a flight safe.
 
-Sources: PX4 user guide, pages Offboard Mode and Parameter Reference; ArduPilot Copter, pages Guided Mode, Copter
-Commands in Guided Mode and Complete Parameter List. Numbers of commands and messages: MAVLink common.xml.
+Sources: PX4 user guide, pages Offboard Mode and Parameter Reference; ArduPilot Copter, pages Guided
+Mode, Copter Commands in Guided Mode and Complete Parameter List. Numbers of commands and messages:
+MAVLink common.xml.
 """
 
 import math

@@ -1,11 +1,13 @@
 """MAVLink 2 frames: layouts of messages, packing, and the search for whole frames in a stream of bytes.
 
-A frame is 0xFD, length of the payload, two bytes of flags, sequence, system, component, three bytes of message number,
-payload, checksum and, if flag 1 is set, 13 bytes of signature. A wire delivers bytes: frames are recognised by their
-checksum. After bytes that are no frame the search goes on at the next byte, so that no false start hides a frame.
+A frame is 0xFD, length of the payload, two bytes of flags, sequence, system, component, three bytes
+of message number, payload, checksum and, if flag 1 is set, 13 bytes of signature. A wire delivers
+bytes: frames are recognised by their checksum. After bytes that are no frame the search goes on at
+the next byte, so that no false start hides a frame.
 
-`pymavlink.dialects.v20.common` supplies the layouts of the common messages. It needs neither NumPy nor a compiler;
-`pymavlink.mavutil` would import NumPy and is not used. pymavlink packs, but never receives.
+`pymavlink.dialects.v20.common` supplies the layouts of the common messages. It needs neither NumPy
+nor a compiler; `pymavlink.mavutil` would import NumPy and is not used. pymavlink packs, but never
+receives.
 """
 
 from functools import cache

@@ -1,13 +1,15 @@
 """Messages between drones: the status that each drone broadcasts, and the reports of a radio channel in software.
 
-A status is one UTM_GLOBAL_POSITION of 95 signed bytes, which any ground station can show. Its 18 bytes of `uas_id`
-carry fields that MAVLink has no place for: version 2, phase, mission (4 bytes), hash of the flight card (4), battery
-(%), error of the own clock (10 ms), number of neighbours heard, and what latitude, longitude and the three velocities
-lost by rounding, a byte each.
+A status is one UTM_GLOBAL_POSITION of 95 signed bytes, which any ground station can show. Its 18
+bytes of `uas_id` carry fields that MAVLink has no place for: version 2, phase, mission (4 bytes),
+hash of the flight card (4), battery (%), error of the own clock (10 ms), number of neighbours
+heard, and what latitude, longitude and the three velocities lost by rounding, a byte each.
 
-A report is a TUNNEL message about one thing: which drones a drone hears, or which drones a fault affects.
+A report is a TUNNEL message about one thing: which drones a drone hears, or which drones a fault
+affects.
 
-A line for a person, by an autopilot or a node, is one STATUSTEXT, or several where it is longer than 50 letters.
+A line for a person, by an autopilot or a node, is one STATUSTEXT, or several where it is longer
+than 50 letters.
 """
 
 import struct

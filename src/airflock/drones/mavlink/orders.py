@@ -1,8 +1,9 @@
 """Orders of the operator, signed with a key of their own, so that no drone, captured or not, can give one.
 
-An order is a TUNNEL message: 35 bytes of content and an Ed25519 signature of 64. It travels inside a frame that is
-signed like all others. The content holds a magic word, version, kind of order, target (0: all), the mission, the time
-at which the order was given, the time for which it is, and a point in degrees and millimetres.
+An order is a TUNNEL message: 35 bytes of content and an Ed25519 signature of 64. It travels inside
+a frame that is signed like all others. The content holds a magic word, version, kind of order,
+target (0: all), the mission, the time at which the order was given, the time for which it is, and a
+point in degrees and millimetres.
 """
 
 import struct

@@ -1,8 +1,9 @@
 """Signed packets between drones: MAVLink 2 signatures with one secret per mission, and their strict reception.
 
-A signature is the first six bytes of SHA-256 over secret, frame, link and stamp; a stamp counts 10 µs since 2015. The
-receiver checks header, length, sender and signature, then the stamp against the own clock and against the last one of
-this sender. Only then does it keep the stamp, so that nothing invalid can change its state.
+A signature is the first six bytes of SHA-256 over secret, frame, link and stamp; a stamp counts 10
+µs since 2015. The receiver checks header, length, sender and signature, then the stamp against the
+own clock and against the last one of this sender. Only then does it keep the stamp, so that nothing
+invalid can change its state.
 """
 
 import hashlib

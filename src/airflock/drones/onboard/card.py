@@ -1,7 +1,7 @@
 """The flight card: everything that a drone must know before it flies, as plain JSON; all members carry the same one.
 
-It is written on the ground from a scenario (`airflock fly prepare`), and read on board with the standard library. Its
-hash travels in every packet: drones with different cards do not flock.
+It is written on the ground from a scenario (`airflock fly prepare`), and read on board with the
+standard library. Its hash travels in every packet: drones with different cards do not flock.
 """
 
 import hashlib
@@ -269,8 +269,8 @@ class Fence:
     def sides(self, x: float, y: float) -> list[FenceSide]:
         """Return distance (m, negative beyond) and inward unit normal of each side that can be reached from a position.
 
-        These are all sides of a convex fence; of any other, the sides that can be seen. From outside the nearest point
-        counts, too.
+        These are all sides of a convex fence; of any other, the sides that can be seen. From
+        outside the nearest point counts, too.
         """
         # A convex fence is a handful of planes, each valid everywhere. A polygon with a notch needs
         # the sides that can be seen from here, or a side behind another one would push.

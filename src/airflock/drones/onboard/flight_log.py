@@ -1,6 +1,7 @@
 """The log of a flight on board: every input with its time, and the digest of every output, one JSON line each.
 
-A log can be flown again through the same node, bit for bit: each decision can be looked at in a debugger.
+A log can be flown again through the same node, bit for bit: each decision can be looked at in a
+debugger.
 """
 
 import hashlib

@@ -1,7 +1,8 @@
 """The mission: phases of a flight, and the table of transitions between them. Pure: facts in, a row out.
 
-Rows are tried in the order of the table; the first transition whose event holds wins. Rows without a target change the
-commanded velocity, not the phase, and hide nothing below them. The pilot and the autopilot outrank everything (row 1).
+Rows are tried in the order of the table; the first transition whose event holds wins. Rows without
+a target change the commanded velocity, not the phase, and hide nothing below them. The pilot and
+the autopilot outrank everything (row 1).
 """
 
 from collections.abc import Callable

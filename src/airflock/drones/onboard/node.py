@@ -1,7 +1,7 @@
 """The node: what a drone runs beside its autopilot. Bytes in, bytes out, the clock passed in; no sockets, no files.
 
-autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) returns what is to be sent. The same inputs
-give the same outputs to the bit, so that a log can be flown again.
+autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) returns what is to be
+sent. The same inputs give the same outputs to the bit, so that a log can be flown again.
 """
 
 import re

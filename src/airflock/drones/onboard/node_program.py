@@ -473,8 +473,9 @@ def tick_task(
 ) -> Generator[TaskRest, None, TickCounts]:  # fmt: skip
     """Tick a node every `period` s on the real clock until `has_ended` returns True, and pass bytes.
 
-    Bytes from the autopilot and from serial lines are read as they come: an own state holds when it arrives, and a line
-    buffers little. Datagrams of radios carry the time at which they hold; they wait for the next tick.
+    Bytes from the autopilot and from serial lines are read as they come: an own state holds when it
+    arrives, and a line buffers little. Datagrams of radios carry the time at which they hold; they
+    wait for the next tick.
 
     ports : the autopilot's first, then those of the radios
     notify: function that takes the node's notes

@@ -1,6 +1,7 @@
 """Knowledge of others: status of each member, orders of the operator, and state and health of the autopilot.
 
-Peers send states; nothing that they send is a command. Implausible statuses and frames change nothing.
+Peers send states; nothing that they send is a command. Implausible statuses and frames change
+nothing.
 """
 
 from collections import deque
@@ -313,8 +314,8 @@ class AutopilotLink:
     def overdue_streams(self, now: float) -> list[int]:
         """Return the messages that are not heard, or no longer; all that it knew is forgotten if none is heard.
 
-        An autopilot that reboots forgets the requested streams and sends heartbeats only: no message with its time
-        since boot would say so.
+        An autopilot that reboots forgets the requested streams and sends heartbeats only: no
+        message with its time since boot would say so.
         """
         overdue = [n for n in STREAM_RATES if now - self.arrivals.get(n, -1e9) > STREAM_SILENCE]
         alive = now - self.heartbeat_at <= STREAM_SILENCE

@@ -168,8 +168,9 @@ class PredictedVelocity:
 class ResponseWatch:
     """Comparison of own velocities with own commands: is the drone as quick as its card says?
 
-    Two drones are flown along by the same commands, one as the card says and one half as quick. On a real autopilot
-    whose card said 1.0 s and 6 m/s², a flock passed a hovering drone at 1.35 m: nothing on board had looked.
+    Two drones are flown along by the same commands, one as the card says and one half as quick. On
+    a real autopilot whose card said 1.0 s and 6 m/s², a flock passed a hovering drone at 1.35 m:
+    nothing on board had looked.
     """
 
     def __init__(self, safety: SafetyLimits):

@@ -46,9 +46,10 @@ class BlockLayout:
     def bounds(self) -> tuple[int, int]:
         """Threads of a block, and blocks that a multiprocessor shall hold at least: so many registers a thread gets.
 
-        Warps that wait for each other's results hide it where flocks fill the GPU. Left alone a thread takes 159
-        registers; with 128 none is spilled. On an H200 a flock of 100 agents flies 60 s in 5.4 ms with 128
-        registers and in 6.1 with 96; 1,000 flocks in 19.4 and 20.0, 5,000 in 89.2 and 85.5. Fewer are slower.
+        Warps that wait for each other's results hide it where flocks fill the GPU. Left alone a
+        thread takes 159 registers; with 128 none is spilled. On an H200 a flock of 100 agents flies
+        60 s in 5.4 ms with 128 registers and in 6.1 with 96; 1,000 flocks in 19.4 and 20.0, 5,000
+        in 89.2 and 85.5. Fewer are slower.
         """
         registers = SATURATED if self.is_crowded else ROOMY
         alone = not self.registers or self.per_agent > 1  # a multiprocessor, and all the registers that it can use
@@ -66,10 +67,11 @@ def block_layout(
 ) -> BlockLayout:  # fmt: skip
     """Layout for many flocks of this size on a GPU with this many multiprocessors.
 
-    Few flocks leave most of a GPU idle. Where a flock is one warp, several threads then share the pairs of one agent;
-    larger ones have warps enough to hide each other's waiting, and sums over threads cost more than they save (100
-    agents for 60 s, one flock on an H200: 5.4 ms with one thread per agent, 6.0 with two; 30 agents, a hundred flocks:
-    5.2 ms with one, 4.3 with two, 3.9 with four; a thousand: 5.6, 8.6 and 11.8).
+    Few flocks leave most of a GPU idle. Where a flock is one warp, several threads then share the
+    pairs of one agent; larger ones have warps enough to hide each other's waiting, and sums over
+    threads cost more than they save (100 agents for 60 s, one flock on an H200: 5.4 ms with one
+    thread per agent, 6.0 with two; 30 agents, a hundred flocks: 5.2 ms with one, 4.3 with two, 3.9
+    with four; a thousand: 5.6, 8.6 and 11.8).
 
     sequential  : one agent after another
     whole_flock : some rule solves for the whole flock, which one thread does

@@ -1,9 +1,9 @@
 """Cells: kernels of one big flock, whose neighbours lie in the cells around each agent.
 
-Six launches per decision: agents are counted per cell, the counts are summed up (two launches), agents are listed by
-cell and copied in the order of cells, within a cell by their number; then each meets its neighbours, decides and moves.
-So the order of every sum, and with it every bit, is the same in each run. Only for perception without noise, delay and
-loss.
+Six launches per decision: agents are counted per cell, the counts are summed up (two launches),
+agents are listed by cell and copied in the order of cells, within a cell by their number; then each
+meets its neighbours, decides and moves. So the order of every sum, and with it every bit, is the
+same in each run. Only for perception without noise, delay and loss.
 """
 
 import math
@@ -232,7 +232,8 @@ def _stages(build: CudaBuilder) -> tuple[str, ...]:
 def private_columns(plan: Plan) -> int:
     """Columns that only the agent itself reads, in whole vectors: command, the model's memory, and gusts.
 
-    Each agent keeps the gusts of the flock: they go on from step to step, and no launch can hand them to all others.
+    Each agent keeps the gusts of the flock: they go on from step to step, and no launch can hand
+    them to all others.
     """
     memory = len(getattr(plan.model.Memory, "_fields", ()))
     return -(-(3 + memory + (GUSTS if plan.windy else 0)) // 4) * 4
@@ -330,8 +331,9 @@ def _advance(build: CellBuilder) -> list[str]:
 def _edges(build: CellBuilder) -> list[str]:
     """Cells around the own one: along z and y from low to high, along x in one run and, across a face, two more.
 
-    In a periodic box cells are counted from one box before the first, so that the count says at which image they lie.
-    In a box of one or two cells a cell comes more than once, each time at another image; one of them is in reach.
+    In a periodic box cells are counted from one box before the first, so that the count says at
+    which image they lie. In a box of one or two cells a cell comes more than once, each time at
+    another image; one of them is in reach.
     """
     lines = ["parts = 1"]
     for c, a in enumerate("xyz"):
@@ -441,8 +443,8 @@ def memory_error(scenario: Scenario, plan: Plan) -> str | None:
 class LargeFlock:
     """One big flock in the GPU's memory.
 
-    Its tables are in the order of the cells of the last decision: near (agent, 8) holds x y z number vx vy vz nothing,
-    rest (agent, columns) command and memory of the model.
+    Its tables are in the order of the cells of the last decision: near (agent, 8) holds x y z
+    number vx vy vz nothing, rest (agent, columns) command and memory of the model.
     """
 
     def __init__(self, scenario: Scenario, plan: Plan, seed: int = 0, start: Any = None):

@@ -1,7 +1,8 @@
 """All uses of private modules of Numba, behind one guard.
 
-Private modules change without notice. Where Numba is not of the TESTED versions, or AIRFLOCK_PLAIN_NUMBA is set,
-drivers are compiled by plain `njit` and kept by Numba's own cache: the same flights, compiled more slowly.
+Private modules change without notice. Where Numba is not of the TESTED versions, or
+AIRFLOCK_PLAIN_NUMBA is set, drivers are compiled by plain `njit` and kept by Numba's own cache: the
+same flights, compiled more slowly.
 
 driver_compiler : the compiler of drivers, without the work that a driver never needs
 sealed_cache    : compiled drivers on disk under checksums, and a lock so that one process compiles each

@@ -1,8 +1,9 @@
 """The compiler of drivers: Numba's passes, without machine code that nobody calls.
 
-A driver is some sixty small functions, of which Python calls one. By default Numba makes of each a function that Python
-could call: two wrappers that unpack its arguments, machine code of its own, and all three once more in every caller.
-Here the others stay what their callers link: optimised code of LLVM.
+A driver is some sixty small functions, of which Python calls one. By default Numba makes of each a
+function that Python could call: two wrappers that unpack its arguments, machine code of its own,
+and all three once more in every caller. Here the others stay what their callers link: optimised
+code of LLVM.
 """
 
 from typing import Any
@@ -120,9 +121,9 @@ def _holds_array(kind: Any) -> bool:
 class _SharedTypes:
     """A typing context in which a function of a driver is compiled once for all whole numbers.
 
-    Numba compiles it once more for each whole number that stands in the text of a caller. Not so what goes along
-    arrays, such as those of a wing's 20 stations: LLVM adds up otherwise if it knows how long a loop is. Functions that
-    stand once in a driver are there for all lengths.
+    Numba compiles it once more for each whole number that stands in the text of a caller. Not so
+    what goes along arrays, such as those of a wing's 20 stations: LLVM adds up otherwise if it
+    knows how long a loop is. Functions that stand once in a driver are there for all lengths.
     """
 
     def __init__(self, context: Any):

@@ -1,9 +1,9 @@
 """Compiled drivers on disk: checksums of Numba's files, and a lock so that one process compiles and the others load.
 
-The index and the code of a driver are pickles, which Numba loads without looking. Each gets a seal beside it, written
-last: a hash of the driver's digest, the file's name and its content. A file that does not fit its seal is compiled once
-more, never loaded. A seal does not keep out somebody who may write into the folder; that the folder is the user's alone
-does (`engine.store`).
+The index and the code of a driver are pickles, which Numba loads without looking. Each gets a seal
+beside it, written last: a hash of the driver's digest, the file's name and its content. A file that
+does not fit its seal is compiled once more, never loaded. A seal does not keep out somebody who may
+write into the folder; that the folder is the user's alone does (`engine.store`).
 """
 
 import gc
@@ -161,7 +161,8 @@ def locked_compile(compile_: Callable[[Any], Any], folder: Path) -> Callable[[An
 def folder_lock(folder: Path, timeout: float = PATIENCE) -> Iterator[bool]:
     """Hold the lock of a folder; whether it is held. It is not where the file system knows no locks.
 
-    While it waits, who listens to the compiler's passes is told of each try: an interruption is heard.
+    While it waits, who listens to the compiler's passes is told of each try: an interruption is
+    heard.
     """
     handle = -1
     try:
@@ -208,7 +209,8 @@ def rare_gc() -> Iterator[None]:
 def import_numpy_implementations() -> None:
     """Read the modules in which Numba implements NumPy without SciPy, which takes longer than all the others.
 
-    Numba imports it to learn that it is there; what needs it looks again when it is called. Below Numba's lock.
+    Numba imports it to learn that it is there; what needs it looks again when it is called. Below
+    Numba's lock.
     """
     if "numba.np.arraymath" in sys.modules:
         return

@@ -61,9 +61,10 @@ class Builder:
     def row(self, name: str) -> int:
         """Index of a row of the work table, from its end where it is negative.
 
-        Unperturbed perception shares the rows of the truth. Rows of faults, of agents that differ and of who lies where
-        come last, so that the others lie to each other as they do in a flight without: loops take a fortieth longer
-        where rows that are written lie a page from rows that are read.
+        Unperturbed perception shares the rows of the truth. Rows of faults, of agents that differ
+        and of who lies where come last, so that the others lie to each other as they do in a flight
+        without: loops take a fortieth longer where rows that are written lie a page from rows that
+        are read.
         """
         plan = self.plan
         if not plan.believes and name in {f"m{a}" for a in "xyz"} | {f"mv{a}" for a in "xyz"}:

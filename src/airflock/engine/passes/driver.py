@@ -169,7 +169,8 @@ def _agents(build: Builder, lanes: str) -> list[str]:
 def lane_count_line(plan: Plan) -> str:
     """Line of a flight that counts lanes: any rest is filled up where numbers differ among agents.
 
-    Else each number would be spread over another vector before the rest, for each agent that meets the others.
+    Else each number would be spread over another vector before the rest, for each agent that meets
+    the others.
     """
     varied = any(letter for each in plan.every for letter, _ in each.varied)
     return "m = work.shape[1]" if varied and not plan.sequential else LANE_COUNT_LINE
@@ -202,7 +203,8 @@ def replay(plan: Plan) -> str:
 def replay_stages(plan: Plan) -> Builder:
     """Stages of the driver that measures a recording; the last one is `measure_frames`.
 
-    It measures frames of which the first one has the number `first`, so that a recording may come in parts.
+    It measures frames of which the first one has the number `first`, so that a recording may come
+    in parts.
     """
     build = Builder(plan)
     events = stages_of_events(plan)

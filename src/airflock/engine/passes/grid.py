@@ -1,10 +1,11 @@
 """Cell grid: memory and functions of a flock that finds neighbours by cells; for many agents that see a short way.
 
-Data that lie at random in memory (the agents of a cell, their sums) are kept in rows of one agent, so that they cost
-one cache line and not one per number; slots keep them from lying far apart. What stages keep for each other lies in
-memory that lasts for a flight. Where groups have laws of their own, each law sorts the flock again, into cells of its
-own reach, and goes through its own agents. Only for perception without noise, delay and loss; there it equals all
-pairs but for rounding and the order of sums.
+Data that lie at random in memory (the agents of a cell, their sums) are kept in rows of one agent,
+so that they cost one cache line and not one per number; slots keep them from lying far apart. What
+stages keep for each other lies in memory that lasts for a flight. Where groups have laws of their
+own, each law sorts the flock again, into cells of its own reach, and goes through its own agents.
+Only for perception without noise, delay and loss; there it equals all pairs but for rounding and
+the order of sums.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Stage functions: each stage of a flight, specialised for a plan, as a function of its driver.
 
-A maker takes a stage of `engine.stages`, has it specialised, and adds the function to the builder. `driver` calls the
-makers in their order.
+A maker takes a stage of `engine.stages`, has it specialised, and adds the function to the builder.
+`driver` calls the makers in their order.
 """
 
 import ast
@@ -73,8 +73,8 @@ def add_nearest(build: Builder) -> None:
 def add_draw(build: Builder) -> noise.Draw:
     """Functions draw and normal, with rows that do not overlap; None where their loops stand in place of calls.
 
-    Else rows are compared before the loop wherever it stands, which takes a fiftieth of a flight of a hundred, and the
-    loops are compiled at each of six places.
+    Else rows are compared before the loop wherever it stands, which takes a fiftieth of a flight of
+    a hundred, and the loops are compiled at each of six places.
     """
     if not build.apart or build.plan.sequential:
         return None
@@ -273,10 +273,10 @@ def add_excursion(build: Builder) -> ast.Name:
 def add_move(build: Builder) -> None:
     """Function move, with what the stages noise and gusts do once per step, where the body and the wind have them.
 
-    They stand in its own lines, which compile to the same bits as ever; where agents move in turn they are functions.
-    Where rows of faults are read beside those of states, all are marked as lying apart: else written rows are
-    compared with every other at every step. Not where a body remembers: the last
-    bit of a quadrotor would change.
+    They stand in its own lines, which compile to the same bits as ever; where agents move in turn
+    they are functions. Where rows of faults are read beside those of states, all are marked as
+    lying apart: else written rows are compared with every other at every step. Not where a body
+    remembers: the last bit of a quadrotor would change.
     """
     plan = build.plan
     struck = plan.struck and build.ranges

@@ -1,8 +1,9 @@
 """Local names: no local of a helper overwrites a value that a stage, or another helper, still reads; dead ones go.
 
-A helper's statements take the place of its call, so that its locals lie beside the stage's. While statements are made,
-a local of a helper is spelled with a mark of the helper (`near@2`), which no name of Python can have. In the end each
-has its own name, unless one would then read what another has written: that one gets the helper's name as a suffix.
+A helper's statements take the place of its call, so that its locals lie beside the stage's. While
+statements are made, a local of a helper is spelled with a mark of the helper (`near@2`), which no
+name of Python can have. In the end each has its own name, unless one would then read what another
+has written: that one gets the helper's name as a suffix.
 """
 
 import ast
@@ -44,7 +45,8 @@ class LocalOwners:
     ) -> None:
         """Give each marked local a name of the driver.
 
-        Raises what `fault` makes of a local of the stage that has a name which the driver itself binds.
+        Raises what `fault` makes of a local of the stage that has a name which the driver itself
+        binds.
         """
         parts: list[ast.AST] = [*statements, *([] if answer is None else [answer])]
         names = [item for part in parts for item in walk_tree(part) if isinstance(item, ast.Name)]
@@ -163,7 +165,8 @@ def _join(written: LastWriters, other: LastWriters) -> None:
 def can_share_name(statements: list[ast.stmt], marked: Any, name: str) -> bool:
     """Return True if the result of a helper can have the name that its caller gives it.
 
-    So it is where both use one word, and the helper reads nothing else by that name, but to begin with.
+    So it is where both use one word, and the helper reads nothing else by that name, but to begin
+    with.
     """
     if not isinstance(marked, ast.Name) or MARK.sub("", marked.id) != MARK.sub("", name):
         return False
@@ -209,7 +212,8 @@ def _names(nodes: Iterable[ast.AST], context: type[ast.expr_context]) -> set[str
 def without_dead(statements: list[ast.stmt], kept: set[str]) -> list[ast.stmt]:
     """Statements without variables that nobody reads, and without loops and branches that nothing is left of.
 
-    What a stage calls to set a variable has no other effect; a call that has one stands alone, or sets several.
+    What a stage calls to set a variable has no other effect; a call that has one stands alone, or
+    sets several.
 
     kept : names that are read elsewhere
     """

@@ -1,8 +1,8 @@
 """Copies: texts of rules from earlier drivers, for drivers that would write the same.
 
-Writing the texts of rules takes half of the time of the text of a driver. A copy is used if all that it depended on is
-unchanged: the values of names in the rule, choices and vectors of its records, and the names of functions that it
-calls, which come along.
+Writing the texts of rules takes half of the time of the text of a driver. A copy is used if all
+that it depended on is unchanged: the values of names in the rule, choices and vectors of its
+records, and the names of functions that it calls, which come along.
 """
 
 from collections import OrderedDict

@@ -1,9 +1,9 @@
 """From plain rules to the text of one driver module.
 
-The text of each rule is copied, global constants are inlined, float literals are cast to `real`, choices of a parameter
-record become constants, and every plain function that a rule calls comes along; one that is handed a choice comes in a
-text of its own for each. The engine writes the loops around it (`passes`); the result is one file that depends on
-nothing but Numba.
+The text of each rule is copied, global constants are inlined, float literals are cast to `real`,
+choices of a parameter record become constants, and every plain function that a rule calls comes
+along; one that is handed a choice comes in a text of its own for each. The engine writes the loops
+around it (`passes`); the result is one file that depends on nothing but Numba.
 """
 
 import ast

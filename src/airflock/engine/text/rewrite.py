@@ -1,7 +1,7 @@
 """Rewrite: the tree of one rule as a driver holds it.
 
-Free names are bound, float literals are cast to `real`, choices become constants and leave one branch, vectors are
-written out, and what the rule calls is named as the driver names it.
+Free names are bound, float literals are cast to `real`, choices become constants and leave one
+branch, vectors are written out, and what the rule calls is named as the driver names it.
 """
 
 import ast

@@ -268,8 +268,9 @@ def _fit_delay(logs: FlightLogs, dt: float, z: NDArray[np.float64]) -> tuple[NDA
 def _counted_rows(logs: FlightLogs) -> NDArray[np.bool_]:
     """Return True for rows whose increment counts: not for one that begins as a command arrives.
 
-    That command was computed from the very velocity that the filter does not know, so that the gap to it is wrong by
-    what the filter is wrong by. Where most rows have a command of their own, all count.
+    That command was computed from the very velocity that the filter does not know, so that the gap
+    to it is wrong by what the filter is wrong by. Where most rows have a command of their own, all
+    count.
     """
     fresh = np.zeros(len(logs.time), bool)
     fresh[2:] = (logs.command[1:-1] != logs.command[:-2]).any(axis=1) & ~logs.is_new[1:-1]
@@ -287,8 +288,8 @@ def _blocks(logs: FlightLogs) -> NDArray[np.int64]:
 def _lowest(loss: Callable[[Any], float], gap: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the log parameters of the highest mode of the likelihood.
 
-    Where no row is at the limit, the limit has no slope: a descent that went there with too long a tau stays. So other
-    limits are looked at, with shorter lags beside them.
+    Where no row is at the limit, the limit has no slope: a descent that went there with too long a
+    tau stays. So other limits are looked at, with shorter lags beside them.
     """
     first = [_descent(loss, np.log(s)) for s in STARTS]
     best = min(first, key=lambda found: float(found.fun))
@@ -414,8 +415,9 @@ MIN_ROWS = 200  # fewest rows for an estimate
 def instrumental_tau(logs: FlightLogs, tau: float, a_max: float) -> float:
     """Give tau (s) by another way: increments against the gap, with the gap to an earlier velocity as instrument.
 
-    White noise of the row is not in the earlier velocity, so it does not bias the ratio of covariances. Rows at the
-    limit are left out. Where commands run ahead of the vehicle (feed-forward) the two ways disagree.
+    White noise of the row is not in the earlier velocity, so it does not bias the ratio of
+    covariances. Rows at the limit are left out. Where commands run ahead of the vehicle
+    (feed-forward) the two ways disagree.
     """
     lag = 3
     gap = logs.command - logs.velocity

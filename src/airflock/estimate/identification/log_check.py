@@ -221,8 +221,9 @@ def fly_logs(
 ) -> tuple[FlightLogs, pd.DataFrame, Any]:
     """Fly in the plane; return the logs, the packets, and the recording.
 
-    The scenario's metrics.period is the period of the log. Packets: receiver, sender, t (receiver's clock), stamp
-    (sender's clock), distance (m), got (0 or 1), fast and slow (packets due on each link).
+    The scenario's metrics.period is the period of the log. Packets: receiver, sender, t (receiver's
+    clock), stamp (sender's clock), distance (m), got (0 or 1), fast and slow (packets due on each
+    link).
     """
     recording = simulate(scenario, seed)
     order = ("time", "space", "keypoint", "individual")

@@ -131,8 +131,9 @@ class DelayFit:
 def fit_delay(heard: pd.DataFrame) -> DelayFit:
     """Fit the age of packets and the clocks of the drones by least squares.
 
-    The age of a packet is delay + clock of the receiver - clock of the sender; with both directions of a pair the
-    clocks cancel. An asymmetry of the two directions cannot be separated from an offset of the clocks.
+    The age of a packet is delay + clock of the receiver - clock of the sender; with both directions
+    of a pair the clocks cancel. An asymmetry of the two directions cannot be separated from an
+    offset of the clocks.
     """
     got = heard[heard["got"] > 0] if "got" in heard else heard
     names = pd.unique(pd.concat([got["receiver"], got["sender"]]))
@@ -259,8 +260,9 @@ def table_entries(heard: pd.DataFrame, spacing: float) -> dict[str, float]:
     heard   : with the columns distance (m) and got (0 or 1)
     spacing : distance between one entry and the next, m
 
-    Returns spacing and received_0 to received_15: the least-squares fit of the table's straight lines. An entry without
-    a row within one spacing takes the value of the nearest one that has any.
+    Returns spacing and received_0 to received_15: the least-squares fit of the table's straight
+    lines. An entry without a row within one spacing takes the value of the nearest one that has
+    any.
 
     Raises RecordingError where a column is missing, no row is left, or the spacing is not positive.
     """
@@ -271,8 +273,8 @@ def table_entries(heard: pd.DataFrame, spacing: float) -> dict[str, float]:
 def fit_table(heard: pd.DataFrame, spacing: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Fit the entries of a table of reception, with standard errors; nan for an entry without a row near it.
 
-    Errors are those of independent packets, each of which arrives with the probability of its distance. As in
-    `table_entries`, which says what is raised.
+    Errors are those of independent packets, each of which arrives with the probability of its
+    distance. As in `table_entries`, which says what is raised.
     """
     lacking = [name for name in ("distance", "got") if name not in heard]
     if lacking:
@@ -341,9 +343,9 @@ NEAREST, FARTHEST = (0.1, 0.2, 1e-5, 1e-5), (1e4, 1e4, 1.0 - 1e-5, 1.0 - 1e-5)  
 def best_mode(loss: Any, farthest: float) -> list[Any]:
     """Find the best mode of the likelihood along far: a longer far hides behind a smaller share there.
 
-    At each of many lengths of far the other three are fitted; all four are from each length that is better than both
-    beside it, or likely enough for a hill to stand between it and the next. Returns the best, and others that are
-    nearly as likely.
+    At each of many lengths of far the other three are fitted; all four are from each length that is
+    better than both beside it, or likely enough for a hill to stand between it and the next.
+    Returns the best, and others that are nearly as likely.
     """
     # Lengths grow by a constant factor: the likelihood depends on the ratio of far to the distances
     # flown.
@@ -406,8 +408,8 @@ def pack(near: float, far: float, received_near: float, received_far: float) -> 
 def profile_intervals(loss: Any, z: Any) -> dict[str, tuple[float, float]]:
     """Return 95 % intervals: the range of each number where the likelihood is hardly lower (its profile).
 
-    At each value of a number the other three are fitted again. Curvature says too little where a share is nearly 1, or
-    where far and the share there make up for each other along a ridge.
+    At each value of a number the other three are fitted again. Curvature says too little where a
+    share is nearly 1, or where far and the share there make up for each other along a ridge.
     """
     lowest_loss, spread, values = float(loss(z)), _spread(loss, z), unpack(z)
     ends = np.array([values, values])

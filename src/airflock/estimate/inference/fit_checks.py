@@ -68,7 +68,8 @@ def carry_pushes(
 ) -> Iterator[Array]:
     """Integrate pushes (unit, individual): how far they have moved individuals until each frame.
 
-    A push goes on in position and velocity until the walk has put them right, by its shares of a difference.
+    A push goes on in position and velocity until the walk has put them right, by its shares of a
+    difference.
     """
     moved: Array = np.zeros(())
     faster: Array = moved

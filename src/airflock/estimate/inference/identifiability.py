@@ -42,9 +42,10 @@ UNLIKELY = 20.0  # loss above the fit, beyond which no climb begins where anothe
 def identifiable_indices(model: FitModel, start: Array, start_points: Array, spans: Sequence[int]) -> list[int]:
     """Return indices of the named numbers that tracks can identify, in order; the others stay at their defaults.
 
-    A number is not identifiable if it changes nothing anywhere along its range, such as the limit of a law that has
-    none; or if the earlier numbers explain its slope at the best of many places taken together, such as a mass beside
-    all weights. A radius within which nobody is at these places has no slope, but an effect along its range: kept.
+    A number is not identifiable if it changes nothing anywhere along its range, such as the limit
+    of a law that has none; or if the earlier numbers explain its slope at the best of many places
+    taken together, such as a mass beside all weights. A radius within which nobody is at these
+    places has no slope, but an effect along its range: kept.
     """
     places = []
     # Slopes at several good points: one point may lie where a part of the law is switched off.
@@ -96,9 +97,10 @@ def canonical_model(
 ) -> tuple[FitModel, Array]:
     """Express a model in the numbers that are declared first; return it and its point, unchanged if nothing is gained.
 
-    A number that was given up before the search may come back under the name of a later one: the weight of one force as
-    the unit of all forces, a radius as another within which its neighbours act, too. Where either of two numbers
-    explains the tracks, the one that is declared first is kept; the later one takes its default.
+    A number that was given up before the search may come back under the name of a later one: the
+    weight of one force as the unit of all forces, a radius as another within which its neighbours
+    act, too. Where either of two numbers explains the tracks, the one that is declared first is
+    kept; the later one takes its default.
 
     law : with all its numbers; the fit is on all spans, and its place is carried over as it is
     """
@@ -159,12 +161,13 @@ def _anywhere(model: FitModel, fit: Fit, curved: Array, number: int, spans: Sequ
 def droppable_parameters(model: FitModel, fit: Fit, on_progress: Callable[[], None]) -> tuple[list[int], Array, Array]:
     """Return the named numbers without which the tracks are explained as well, and two points of the rest without each.
 
-    Each number that stands away from its default, or whose default lies outside the range that was searched, is put
-    there in turn, the last declared first, and the rest is fitted again: from where the others make up for it, and from
-    where another number of its unit takes its part. So is a number near its default that may as well stand elsewhere,
-    such as a mass beside forces.
+    Each number that stands away from its default, or whose default lies outside the range that was
+    searched, is put there in turn, the last declared first, and the rest is fitted again: from
+    where the others make up for it, and from where another number of its unit takes its part. So is
+    a number near its default that may as well stand elsewhere, such as a mass beside forces.
 
-    The first place is where a few frames are explained best; the second is the fit's own place, carried over.
+    The first place is where a few frames are explained best; the second is the fit's own place,
+    carried over.
     """
     few = model.few()
     best = climb_to_maximum(model, fit.place, fit.free, few, slopes=(WIDE_SLOPES,))
@@ -264,8 +267,8 @@ def profile_ridges(
 ) -> tuple[Fit, Ridges]:
     """Follow ridges from a fit, or from a better one on the way, down to a drop of the likelihood.
 
-    Other ends that the search has met, and places on the way to a better fit, are added where they are as likely: each
-    by itself, for a valley may lie between.
+    Other ends that the search has met, and places on the way to a better fit, are added where they
+    are as likely: each by itself, for a valley may lie between.
     """
     ways: list[RidgePath] = []
     met = list(fit.others)
@@ -452,7 +455,8 @@ def restore_parameters(
 ) -> tuple[FitModel, Fit]:
     """Restore dropped numbers that explain something far from their defaults, with the others elsewhere.
 
-    A number is given up where no climb from the fit says anything for it. A walk may lead higher all the same.
+    A number is given up where no climb from the fit says anything for it. A walk may lead higher
+    all the same.
 
     law : with all its numbers
     """
@@ -495,8 +499,9 @@ def ridges_from_point(
 ) -> list[RidgePath]:
     """Follow ways on which a number leaves a point; none where that would not concern the others.
 
-    They say nothing of a number that changes nothing; nor of one that the others make up for exactly, such as the unit
-    of all weights: no tracks could identify it, and its default is the unit of the others.
+    They say nothing of a number that changes nothing; nor of one that the others make up for
+    exactly, such as the unit of all weights: no tracks could identify it, and its default is the
+    unit of the others.
 
     model : with the number; fit : without it
     """

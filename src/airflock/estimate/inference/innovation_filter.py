@@ -289,9 +289,10 @@ KEEP = FitParameter("keep", -1, "1", 0.0, 1.0, False, 0.9)
 def huber_differences(e: Array) -> Array:
     """Return differences whose squares grow only linearly where they are large (Huber 1964).
 
-    A law has edges: somebody just within a radius flies on otherwise than somebody just outside. Who is near an edge,
-    and is seen with noise, is now and then predicted on its wrong side, also by the numbers that flew. The square of
-    one such step would outweigh all that thousands of others say of a number. Normal differences keep their variance.
+    A law has edges: somebody just within a radius flies on otherwise than somebody just outside.
+    Who is near an edge, and is seen with noise, is now and then predicted on its wrong side, also
+    by the numbers that flew. The square of one such step would outweigh all that thousands of
+    others say of a number. Normal differences keep their variance.
 
     e : (step, component); differences up to `SOFT` of their `robust_deviation` stay as they are but for a factor, the
         same for

@@ -215,7 +215,8 @@ class InferResult:
 def judge_laws(laws: list[LawResult]) -> tuple[LawResult | None, str]:
     """Return the law that explains the tracks, if one does, and the verdict.
 
-    Of laws that predict as well within a standard error it is the one with the fewest numbers (Breiman et al. 1984).
+    Of laws that predict as well within a standard error it is the one with the fewest numbers
+    (Breiman et al. 1984).
     """
     first = laws[0]
     if not _explains(first):
@@ -445,7 +446,8 @@ class _Comparison:
     def contest(self, laws: list[LawResult], models: dict[str, FitModel]) -> None:
         """Search deeper for the best law, and for each that is not worse with certainty; sort the laws again.
 
-        A law may lose for want of searching alone: a short search ends on another hill now and then.
+        A law may lose for want of searching alone: a short search ends on another hill now and
+        then.
         """
         searched: set[str] = set()
         while waiting := [law for law in (laws[0], *indistinguishable_laws(laws)) if law.name not in searched]:

@@ -98,7 +98,8 @@ def restore_useful(
 ) -> tuple[FitModel, Fit]:
     """Restore the numbers that were dropped before the search, but explain something at the fit.
 
-    Before the search, `identifiable` asks at places that explain little; at the fit the answer may differ.
+    Before the search, `identifiable` asks at places that explain little; at the fit the answer may
+    differ.
 
     law : with all its numbers
     """
@@ -211,8 +212,8 @@ def make_folds(model: FitModel) -> list[list[int]]:
 def outlier_log_density(z: Array) -> Array:
     """Return the negative log-density of differences in standard deviations: normal, one in a thousand is wild.
 
-    An individual that a prediction lost for a moment, or a tracker, would otherwise outweigh all other steps: at ten
-    standard deviations a normal density is 10^-22.
+    An individual that a prediction lost for a moment, or a tracker, would otherwise outweigh all
+    other steps: at ten standard deviations a normal density is 10^-22.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         square = np.minimum(np.nan_to_num(z * z, nan=1e12), 1e12)

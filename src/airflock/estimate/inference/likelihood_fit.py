@@ -1,9 +1,9 @@
 """Fit the numbers of a law: climb to the maximum of the likelihood of the next frame.
 
-The likelihood is that of `innovation_filter`. Gauss-Newton steps climb it from many points. Slopes are taken by wide
-steps first, which smooth a rough surface, then by steps of about one standard error: wider ones cut the corners of a
-bent ridge. A weak prior (a standard deviation of half the range, on the scale of the search) keeps flat directions in
-place.
+The likelihood is that of `innovation_filter`. Gauss-Newton steps climb it from many points. Slopes
+are taken by wide steps first, which smooth a rough surface, then by steps of about one standard
+error: wider ones cut the corners of a bent ridge. A weak prior (a standard deviation of half the
+range, on the scale of the search) keeps flat directions in place.
 """
 
 import math
@@ -150,7 +150,8 @@ def climb_to_maximum(
 def settle_fit(model: FitModel, fit: Fit, spans: Sequence[int] | None) -> Fit:
     """Move a fit along one number at a time, by strides that grow shorter, and climb again.
 
-    A radius changes who is a neighbour at once or not at all: the likelihood has steps there, which slopes do not see.
+    A radius changes who is a neighbour at once or not at all: the likelihood has steps there, which
+    slopes do not see.
     """
     place, lowest = fit.place.copy(), fit.loss
     for stride in STRIDES:
@@ -171,9 +172,9 @@ def settle_fit(model: FitModel, fit: Fit, spans: Sequence[int] | None) -> Fit:
 def standard_errors(model: FitModel, fit: Fit, spans: Sequence[int]) -> Array:
     """Return standard errors of all numbers, as shares of their ranges, by the curvature at a fit; 0 of fixed ones.
 
-    The larger of two: by wide slopes, which cut the corners of a bent ridge, and by fine ones, in which single pairs
-    show that a radius takes in or leaves out. The prior is part of it: a number that the tracks do not tell has about
-    half its range.
+    The larger of two: by wide slopes, which cut the corners of a bent ridge, and by fine ones, in
+    which single pairs show that a radius takes in or leaves out. The prior is part of it: a number
+    that the tracks do not tell has about half its range.
     """
     errors = np.zeros(len(fit.place))
     each = [np.diag(np.linalg.inv(curvature(model, fit, spans, way))) for way in (WIDE_SLOPES, CENTRAL_SLOPES)]
@@ -249,9 +250,9 @@ def conditional_point(fit: Fit, curved: Array, index: int, coordinate: float) ->
 def power_law_point(model: FitModel, fit: Fit, moved: Array, index: int, spans: Sequence[int] | None) -> Array:
     """Return the point of `conditional_point`, with whole exponents: laws are products of whole powers.
 
-    Of numbers that are sought by their logarithm; the others stay where they are. Where thresholds make the curvature
-    rough, exponents may be read off wrongly: from those that are read and from none, each is raised and lowered by one
-    while that explains more.
+    Of numbers that are sought by their logarithm; the others stay where they are. Where thresholds
+    make the curvature rough, exponents may be read off wrongly: from those that are read and from
+    none, each is raised and lowered by one while that explains more.
     """
     wide = [math.log(n.high / n.low) if n.log else 0.0 for n in model.numbers]
     step = (moved[index] - fit.place[index]) * wide[index]
@@ -369,7 +370,8 @@ def race_from_points(
 def scan_ranges(model: FitModel, point: Array, free: Sequence[int], spans: Sequence[int] | None) -> tuple[Array, bool]:
     """Scan the range of one named number at a time; return the best point, and True if it is better.
 
-    Where a threshold lies beyond all that happens, a slope shows nothing; a look along the range does.
+    Where a threshold lies beyond all that happens, a slope shows nothing; a look along the range
+    does.
     """
     lowest, best, moved = loss_at(model, point, free, spans), point, False
     for k in [k for k in free if k < model.named]:
@@ -565,7 +567,8 @@ def parameter_groups(model: FitModel, fit: Fit, spans: Sequence[int]) -> list[li
 def sort_groups(groups: Sequence[list[int]]) -> list[list[int]]:
     """Sort groups: those that mostly repeat earlier ones come last.
 
-    Else the numbers of friction, the least certain, would come three times in other company, and those of a wall never.
+    Else the numbers of friction, the least certain, would come three times in other company, and
+    those of a wall never.
     """
     first: list[list[int]] = []
     # A group that repeats more than half of an earlier one waits, so that other numbers have their

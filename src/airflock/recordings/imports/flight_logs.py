@@ -33,8 +33,9 @@ NED = (("x", "y", "z"), ("vx", "vy", "vz"))
 def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
 
-    The set-point is the request of the companion; vehicle_local_position_setpoint is the controller's own output and
-    is not read. Rows where the estimator calls its position invalid are left out.
+    The set-point is the request of the companion; vehicle_local_position_setpoint is the
+    controller's own output and is not read. Rows where the estimator calls its position invalid are
+    left out.
     """
     try:
         from pyulog import ULog
@@ -121,8 +122,9 @@ LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so 
 def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read a DataFlash log: PSCN, PSCE, PSCD (position, velocity), GUIP (commanded velocity), ORGN and GPS.
 
-    TVN, TVE, TVD are no commands: they are what the position controller makes of GUIP within its limits of acceleration
-    and jerk, so that a response to them looks eight times as quick as that to a command.
+    TVN, TVE, TVD are no commands: they are what the position controller makes of GUIP within its
+    limits of acceleration and jerk, so that a response to them looks eight times as quick as that
+    to a command.
     """
     _need_pymavlink(path)
     with path.open("rb") as file:
@@ -234,8 +236,8 @@ def _add_commands(track: ImportedTrack, at: Any, commands: Any, findings: Import
 def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
 
-    All vehicles share the receiver's clock; a row is put on it by the vehicle's own time, `time_boot_ms`, not by its
-    arrival. Positions are about their own origins.
+    All vehicles share the receiver's clock; a row is put on it by the vehicle's own time,
+    `time_boot_ms`, not by its arrival. Positions are about their own origins.
     """
     _need_pymavlink(path)
     contents = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
@@ -268,8 +270,9 @@ def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
 def state_times(arrival: NDArray[np.float64], boot: NDArray[np.float64]) -> NDArray[np.float64]:
     """Put the times of states, s since boot, on the clock that they arrived by; in order of arrival.
 
-    Arrivals scatter by a period of the link, which would look like jumps of a drone that flies: between two boots both
-    clocks go by one straight line, through the message of each 10 s that was under way for the shortest time.
+    Arrivals scatter by a period of the link, which would look like jumps of a drone that flies:
+    between two boots both clocks go by one straight line, through the message of each 10 s that was
+    under way for the shortest time.
     """
     time = arrival.copy()
     edges = [0, *(np.flatnonzero(np.diff(boot) < -REBOOT) + 1), len(boot)]
@@ -367,9 +370,9 @@ OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs e
 def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read the log of a node on board: local east-north-up of its mission, by the clock of its computer.
 
-    A row is a tick at which the own state was another than at the tick before, at the time at which the state held, not
-    that of the tick. Commands are those of phases in which the node flies; the log's first line relates their clock to
-    UTC.
+    A row is a tick at which the own state was another than at the tick before, at the time at which
+    the state held, not that of the tick. Commands are those of phases in which the node flies; the
+    log's first line relates their clock to UTC.
     """
     with open(path, "rb") as file:
         if not file.read(8).startswith(b'{"log":'):
@@ -422,8 +425,9 @@ def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) ->
 def reckoned_times(seen: NDArray[np.float64], states: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return when states (row, 6) held that were seen at ticks (s) of another clock than that of the states.
 
-    Two clocks of 20 Hz: now and then a tick sees nothing new, and the next one two steps. Position and velocity of a
-    drone that flies say how long a step took; the ticks keep the sum of the steps from running away.
+    Two clocks of 20 Hz: now and then a tick sees nothing new, and the next one two steps. Position
+    and velocity of a drone that flies say how long a step took; the ticks keep the sum of the steps
+    from running away.
     """
     moved, speed = np.diff(states[:, :3], axis=0), 0.5 * (states[1:, 3:] + states[:-1, 3:])
     square, passed = (speed**2).sum(axis=1), np.diff(seen)

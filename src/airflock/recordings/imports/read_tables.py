@@ -171,8 +171,8 @@ def tracks_from_parts(
 def _numbers(piece: pd.DataFrame, name: str, how: ColumnLayout, at: int) -> Any:
     """Return a column as float64; raise RecordingError for the first text in it that is no number.
 
-    Dates become seconds since 1970, durations seconds. Times may also be texts: dates, or hours:minutes:seconds, to
-    which a date in another column is added.
+    Dates become seconds since 1970, durations seconds. Times may also be texts: dates, or
+    hours:minutes:seconds, to which a date in another column is added.
     """
     column, time = piece[name], name in how.times
     if pd.api.types.is_numeric_dtype(column):
@@ -286,8 +286,9 @@ TAGS = ("tag", "tag_local_identifier")  # which several animals wear in turn
 def _choose_id(where: str, how: ColumnLayout, parts: Any, findings: ImportReport) -> None:
     """Choose the column of names by its values: none that numbers the rows, and an animal before its tag.
 
-    Only the first rows are looked at: there every name of a row number is another one, and no other name is.
-    Raises RecordingError where names number the rows and these may be of several individuals.
+    Only the first rows are looked at: there every name of a row number is another one, and no other
+    name is. Raises RecordingError where names number the rows and these may be of several
+    individuals.
     """
     clock = table_columns.column_names(how.expressions["t" if "t" in how.expressions else "utc"])[:1]
     pieces = parts([*how.ids, *clock]) if how.ids and clock else iter(())

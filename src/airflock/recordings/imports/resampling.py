@@ -25,7 +25,8 @@ def time_grid(
 ) -> tuple[Any, float]:
     """Return times (s) from the first to the last row, and their distance: the tracks' own rate by default.
 
-    A window that begins between two rows of the tracks' own rate begins at the later one, so that its times are theirs.
+    A window that begins between two rows of the tracks' own rate begins at the later one, so that
+    its times are theirs.
     """
     usual = [median_period(track) for track in tracks if len(track.time) > 1]
     period = 1.0 / rate if rate else (float(np.median(usual)) if usual else 1.0)
@@ -59,7 +60,8 @@ def grid_tolerance(period: float, *instants: float) -> float:
 def _round(period: float) -> float:
     """Round a period (s) to a rate of four digits, such as 30 or 29.97 Hz, else to four digits of itself.
 
-    Frames of a video are met then, rather than drifted past: with 0.03333 s one is lost in each 10,000 of 30 Hz.
+    Frames of a video are met then, rather than drifted past: with 0.03333 s one is lost in each
+    10,000 of 30 Hz.
     """
     if period > SLOWEST_CAMERA:
         return float(f"{period:.6g}")
@@ -92,7 +94,8 @@ def resample(
 ) -> tuple[xr.Dataset, dict[str, Any]]:
     """Resample tracks to the given times; return the dataset, and the shares that are present and bridged.
 
-    If rows are in no frame: their number `lost`, the first, `lost_at`, and the longest time to a next row, `apart`, s.
+    If rows are in no frame: their number `lost`, the first, `lost_at`, and the longest time to a
+    next row, `apart`, s.
 
     bridge : longest gap (s) that is bridged, by cubic Hermite with the velocities at its ends
     """

@@ -105,7 +105,8 @@ def _choose_receiver(track: ImportedTrack, counts: NDArray[np.bool_], findings: 
 def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) -> list[ImportedTrack]:
     """Drop the rows without a time or a place; raise RecordingError for a file with no others.
 
-    An individual is absent where its place is nan or inf; one that has no place at any time is left out.
+    An individual is absent where its place is nan or inf; one that has no place at any time is left
+    out.
     """
     kept = []
     # By file: a thousand individuals with the same gap give one note.
@@ -813,8 +814,8 @@ def _absent_rows(place: Array, jumps: NDArray[np.int64]) -> NDArray[np.int64]:
 def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
     """Return the error of each predicted step (row - 1, 2), m, and how large it may be (row - 1,), m.
 
-    The logged velocity predicts a step. Without one anything between the step before and the step after it does: a
-    fast start goes on, and a turn began before.
+    The logged velocity predicts a step. Without one anything between the step before and the step
+    after it does: a fast start goes on, and a turn began before.
     """
     step = median_period(track)
     place = track.stack(POSITION_TARGETS, 2)

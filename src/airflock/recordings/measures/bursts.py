@@ -19,8 +19,8 @@ def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
     between; its coast lasts until the next burst begins, or the individual is gone. After Calovi et al., PLoS Comput.
     Biol. 14, e1005933 (2018).
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `least` that is not above
-    0.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `least`
+    that is not above 0.
 
     Examples
     --------

@@ -16,13 +16,13 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     radius    : of an individual, m; by default metrics.r_body of its scenario
 
-    what is "wall", "obstacle 0" and so on as in world.obstacles, or "scene". Each is followed by itself: a contact
-    lasts while an individual is nearer to it than its radius, and ends where the individual is gone. A log without an
-    arena has no contacts. Touches between two frames are not seen; the order parameter n_contacts looks at every step.
-    Geometry, of no publication.
+    what is "wall", "obstacle 0" and so on as in world.obstacles, or "scene". Each is followed by
+    itself: a contact lasts while an individual is nearer to it than its radius, and ends where the
+    individual is gone. A log without an arena has no contacts. Touches between two frames are not
+    seen; the order parameter n_contacts looks at every step. Geometry, of no publication.
 
-    Raises RecordingError for what is no recording of one keypoint, or whose scenario cannot be read (ScenarioError),
-    and ParameterError for a `radius` that is none.
+    Raises RecordingError for what is no recording of one keypoint, or whose scenario cannot be read
+    (ScenarioError), and ParameterError for a `radius` that is none.
 
     Examples
     --------

@@ -20,8 +20,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
     nan where nobody differs from the mean, to the precision of a recording: a group in unison has no fluctuations.
     Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `width` that is not above
-    0.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `width`
+    that is not above 0.
 
     Examples
     --------

@@ -19,7 +19,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
     longest   : largest delay, s; slowest: headings at this speed (m/s) or less do not count
     nan where two are never there together. Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `longest` below 0.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a
+    `longest` below 0.
 
     Examples
     --------
@@ -58,8 +59,8 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
     """Find who leads, a row for each ordered pair: leader, follower, and the delay (s) of the largest correlation (-1
     to 1).
 
-    A positive delay says that the leader is first; each pair stands there twice, with both signs. Where several delays
-    are as good, such as of two that fly straight, it is the shortest of them.
+    A positive delay says that the leader is first; each pair stands there twice, with both signs.
+    Where several delays are as good, such as of two that fly straight, it is the shortest of them.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     longest   : largest delay that is tried, s

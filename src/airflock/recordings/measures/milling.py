@@ -15,8 +15,8 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
     In a periodic world the centre is that of the places as they stand, as it is for the order parameters.
     Couzin et al., J. theor. Biol. 218, 1 (2002), Eq. 5.
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `slowest` that is no
-    number.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a
+    `slowest` that is no number.
 
     Examples
     --------

@@ -46,8 +46,8 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     farthest  : end of the last bin, m; a pair exactly so far apart counts
     A histogram, of no publication.
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `width` that does not lie
-    between 0 and `farthest`.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `width`
+    that does not lie between 0 and `farthest`.
 
     Examples
     --------

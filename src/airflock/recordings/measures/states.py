@@ -19,8 +19,8 @@ class TrackArrays(NamedTuple):
     """Arrays: time (frame,) s, position m and velocity m/s (frame, axis, individual); placed and present (frame,
     individual).
 
-    placed: its position is known; present: its velocity, too. What needs no motion counts all who are placed.
-    box: sides of the periodic world that a simulation flew in, m; else None.
+    placed: its position is known; present: its velocity, too. What needs no motion counts all who
+    are placed. box: sides of the periodic world that a simulation flew in, m; else None.
     """
 
     time: Array

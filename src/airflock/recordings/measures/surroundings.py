@@ -17,8 +17,8 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     In space the map is horizontal: distances in height are left out.
     Maps of neighbours as in Katz et al., PNAS 108, 18720 (2011).
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for `reach` or `cells` that make
-    no map.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for `reach`
+    or `cells` that make no map.
 
     Examples
     --------
@@ -70,8 +70,8 @@ def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> flo
     In space distances and angles are horizontal, as in `density_map`; nan where nobody has a neighbour within reach.
     Our definition, in the plane, of what Ballerini et al., PNAS 105, 1232 (2008), ask of directions in space.
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `reach` that is not above
-    0.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `reach`
+    that is not above 0.
 
     Examples
     --------

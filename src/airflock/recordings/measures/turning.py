@@ -14,8 +14,8 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     A frame holds the turn between the frames on its two sides; at the ends, to the only one there is.
     Geometry, of no publication.
 
-    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `slowest` that is no
-    number.
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a
+    `slowest` that is no number.
 
     Examples
     --------

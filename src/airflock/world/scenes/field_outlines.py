@@ -413,7 +413,8 @@ def _ground(outlines: list[Outline], where: str, simplify: float, space: bool, l
 def _cut(shape: Polygon, plan: Polygon, most: float) -> Polygon:
     """Cut a forbidden shape off where it reaches outside of a field by no more than `most`, m.
 
-    A wood that ends where the field does is outside by the rounding of its coordinates, or by what corners moved.
+    A wood that ends where the field does is outside by the rounding of its coordinates, or by what
+    corners moved.
     """
     if not (shape.is_valid and plan.is_valid) or plan.covers(shape) or not plan.buffer(2.0 * most).covers(shape):
         return shape

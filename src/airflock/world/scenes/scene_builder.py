@@ -288,8 +288,8 @@ def _tables(found: Scene) -> Any:
 def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> NDArray[np.float64]:
     """Goals in their order (goal, 3), m.
 
-    Free points are drawn by the scene's seed: within the scene, between the two heights, clear of everything, and at
-    least goals.apart from the one before.
+    Free points are drawn by the scene's seed: within the scene, between the two heights, clear of
+    everything, and at least goals.apart from the one before.
     """
     if g.kind == "none":
         return np.zeros((0, 3))
