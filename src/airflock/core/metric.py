@@ -83,7 +83,7 @@ METRIC_SET = {
 }
 
 
-ABSENCE = {  # by how instants combine, `vocabulary.OVER_TIME`
+ABSENCE = {  # by how instants combine, `contract.OVER_TIME`
     "mean": "mean over instants, each as that of a flock of those who are there",
     "sum": "counted over all instants, of those who are there",
     "min": "the smallest over all instants, of those who are there",

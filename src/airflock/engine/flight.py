@@ -818,9 +818,6 @@ def flight_html(flight: "Flight") -> str:
     return head + html_table(("order parameter", "value", "unit", "meaning"), rows)
 
 
-# The public class.
-
-
 class Flight(FlightActions):
     """One flight of a scenario, open: it goes on at each call of `advance`, and may be changed on its way.
 

@@ -165,7 +165,7 @@ class RadioChannel:
         self.sent = self.arrived_count = 0
 
     def send(self, now: float, sender: int, datagram: bytes, positions: Sequence[Position] = ()) -> None:
-        """Send a datagram of a drone, by its index, to all; at: true positions, m."""
+        """Send a datagram of a drone, by its index, to all; positions: true ones, m."""
         is_status = int.from_bytes(datagram[7:10], "little") == STATUS_MESSAGE
         if self._reaches_all_at_once:
             self._queue_packet(now + self._k.delay, sender, self._others[sender], datagram)
@@ -215,7 +215,7 @@ class RadioChannel:
         return faults and [f for f in faults if f.holds(self._members[to], now)]
 
     def deliver(self, now: float, positions: Sequence[Position]) -> Iterator[tuple[int, bytes]]:
-        """Yield datagrams that arrive by now, each with the index of its receiver; at: true positions, m."""
+        """Yield datagrams that arrive by now, each with the index of its receiver; positions: true ones, m."""
         number = max(round(now / self._period), 0)
         # Times are sums of steps, so two that should be equal may differ in the last bits.
         while self._queue and self._queue[0][0] <= now + TIME_TOLERANCE:

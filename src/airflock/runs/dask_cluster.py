@@ -92,8 +92,6 @@ class DaskCluster:
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over; hand out only so many at a time."""
-        # With a time limit one flight per thread: waiting in a worker's queue must not count as
-        # flying.
         from distributed import wait
 
         waiting = list(reversed(flights))
@@ -103,6 +101,8 @@ class DaskCluster:
         try:
             while waiting or out:
                 threads = max(self._threads(), 1)
+                # With a time limit one flight per thread: waiting in a worker's queue must not count as
+                # flying.
                 while waiting and len(out) < threads * (1 if self.timeout else AHEAD):
                     flight = waiting.pop()
                     # impure: equal flights are equal anyway, and dask must not forget or share one

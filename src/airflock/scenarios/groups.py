@@ -242,7 +242,6 @@ def count_of_share(value: Any, agents: int) -> Any:
     share = SHARE.fullmatch(value) if isinstance(value, str) else None
     if share is None or not 0.0 < float(share[1]) <= 100.0:
         return value
-    # A share never rounds to an empty group.
     return max(1, round(float(share[1]) / 100.0 * agents))
 
 

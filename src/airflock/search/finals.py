@@ -220,7 +220,6 @@ def fly_by_successive_halving(
             break
         found = evaluator.evaluate(batch, points[alive], seeds=[seeds] * len(alive))
         for k, (value,) in zip(alive, found, strict=True):
-            # The mean over all flights so far: a finalist keeps what its earlier rounds have shown.
             before = float(rows[k] or 0.0)
             rows[k] = None if value is None else (flown * before + len(seeds) * value) / (flown + len(seeds))
         flown += len(seeds)

@@ -358,8 +358,8 @@ class Player(ComparedFlights):
 
     `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
 
-    Attributes: pace, how fast they fly; moments, to go back to; paused; failure, why they stopped,
-    or nothing.
+    Attributes: clock, how fast they fly; snapshots, to go back to; is_paused; failure_message, why
+    they stopped, or nothing.
     """
 
     def __init__(self, request: FlightRequest):

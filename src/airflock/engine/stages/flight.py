@@ -167,9 +167,8 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         time = real(step) * numbers.c.dt
         if plan.sequential or (step != first) | (half & 1 == 0):
             sense(step, time, late, numbers, whole, past, plan=plan, stages=stages, order=order)
-        # where agents take turns, who senses and who moves alternate: there is no place to cut a
-        # step The first half of a step ends before anybody moves, so that a caller can overrule
-        # commands.
+        # The first half of a step ends before anybody moves, so that a caller can overrule commands.
+        # Where agents take turns, those who sense and those who move alternate: no place to cut.
         if not plan.sequential and half & 2 != 0:
             break
         for name in order["watch"]:

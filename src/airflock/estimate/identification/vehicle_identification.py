@@ -172,8 +172,8 @@ def identify(
 
     Parameters
     ----------
-    flight_logs : path, list of paths, xarray.Dataset or Logs
-        Files (as in `load_tracks`), a recording, or Logs.
+    flight_logs : path, list of paths, xarray.Dataset or FlightLogs
+        Files (as in `load_tracks`), a recording, or logs.
     like : Scenario or str
         Scenario or preset that is flown by the same law; what is not identified stays as it is there.
     heard : pandas.DataFrame, optional
@@ -183,7 +183,7 @@ def identify(
         First and last time on the ground, s after each log begins, unless the logs tell it.
     same_clock : bool
         The clocks of all files agree.
-    options : Options, optional
+    options : ImportOptions, optional
         How files are read (`airflock.recordings.imports.track.ImportOptions`), as in `load_tracks`.
     accept : iterable of str
         Kinds of errors that are intended, as in `load_tracks`.
@@ -192,7 +192,7 @@ def identify(
 
     Returns
     -------
-    Identified
+    IdentifyResult
         `numbers`: key → value, interval, origin, or the reason why the logs cannot tell; `scenario()` has them in it.
 
     Raises

@@ -275,8 +275,9 @@ class InnovationFilter:
 SOFT = 1.345  # of a standard deviation: where nothing is wild, estimates are 0.95 as efficient (Huber 1964)
 LOST, TINY = 1e6, 1e-15  # m; somebody who flew off, and less than any difference
 LOOKS = 100  # at most, for a standard deviation; about six do
-# with which normal differences keep their variance: 1 over the mean of twice Huber's function
 _DENSITY, _WITHIN = math.exp(-0.5 * SOFT**2) / math.sqrt(2.0 * math.pi), math.erf(SOFT / math.sqrt(2.0))
+# Factor by which normal differences keep their variance: 1 over the root of the mean of twice
+# Huber's function.
 SAME = (_WITHIN + 2.0 * SOFT * _DENSITY - SOFT**2 * (1.0 - _WITHIN)) ** -0.5
 AS_NORMAL = _WITHIN  # mean of min(z², SOFT |z|) of normal numbers
 FIRST_GAINS = (0.6, 0.3, 0.6, 0.3, 0.9)

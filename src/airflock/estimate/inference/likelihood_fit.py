@@ -488,8 +488,8 @@ def redraw_group(model: FitModel, fit: Fit, group: Sequence[int], few_spans: Seq
         for u in places[: ALONE[0]]
     )
     alone = [end.place for end in sorted(ends, key=lambda end: end.loss)]
-    # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem
-    # lower
+    # Each hill once, whatever its loss: while the other numbers stay at this fit's, a higher hill
+    # may look lower.
     return [*raced, *distinct_points(alone, group, [fit.place, *raced])][: ALL[0]]
 
 
