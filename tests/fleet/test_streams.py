@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from airflock.drones.mavlink.frames import frames_in
+from airflock.drones.mavlink.frames import FramePacker, common_dialect, frames_in
 from airflock.drones.mavlink.orders import OPERATOR_SYSTEM, OperatorOrder, OrderKind, order_message
 from airflock.drones.mavlink.signing import PacketSigner
 from airflock.drones.onboard.mission import FLYING_PHASES, MissionPhase
@@ -27,6 +27,7 @@ RECORDED = card(
 )
 COMMAND, SETPOINT, PARAMETER = 76, 84, 20
 INTERVAL, ARM = 511, 400
+FLOAT_TYPE = 9  # MAV_PARAM_TYPE_REAL32
 
 
 class Record:
@@ -69,6 +70,11 @@ def recorded(case, orders=()):
     (begun, utc), *rows = map(str.split, lzma.decompress(path.read_bytes()).decode().splitlines())
     now, record, orders = float(begun), Record(), list(orders)
     node = Node(RECORDED, 1, SOFTWARE_KEY, now=now, utc=int(utc))
+    # When these flights were recorded no node asked for the limits of the response yet.
+    for check in RECORDED.parameter_checks:
+        if check.limits:
+            values = check.name.encode(), 2.0 * check.low, FLOAT_TYPE, 1, 0
+            node.autopilot(FramePacker(1, 1)(common_dialect().MAVLink_param_value_message(*values)), now)
     for at, data in rows:
         while now + 0.05 < float(at):
             now += 0.05

@@ -94,7 +94,7 @@ def test_a_flood_of_faults_is_bounded(tmp_path):
     (tmp_path / "a.toml").write_text("\n".join(f"{'k' * 150}{i} = 1" for i in range(9000)))
     with pytest.raises(ScenarioError) as fault:
         airflock.load(tmp_path / "a.toml")
-    assert len(fault.value.errors) == 51 and "more faults" in fault.value.errors[-1]
+    assert len(fault.value.errors) == 51 and "more errors" in fault.value.errors[-1]
     assert shortened("x" * 5000, 100) == "x" * 50 + " ... (4900 letters) ... " + "x" * 50
 
 

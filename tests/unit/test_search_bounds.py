@@ -71,7 +71,7 @@ def test_a_landscape_without_a_hill_ends_early_and_says_which_factor_is_zero_and
     with pytest.raises(StudyError) as fault:
         run(study, still, tmp_path)
     said = str(fault.value)
-    assert "fitness = 0 for all of 60 candidates: f_speed is zero in 100 % of flights, f_wall" in said
+    assert "fitness is flat, 0 for all of 60 candidates: f_speed is zero in 100 % of flights, f_wall" in said
     assert "lower model.v_flock" in said and "f_coll" not in said and "\n" not in said
     with FlightStore(tmp_path, write=False) as store:
         assert store.count() == 60

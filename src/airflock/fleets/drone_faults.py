@@ -120,7 +120,7 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[InjectedFault], l
             wrong.append(f"amount is missing: {INJECTED_KINDS[kind]}; give it within [{low:g}, {high:g}]")
         elif not low <= numbers["amount"] <= high:
             wrong.append(f"amount = {numbers['amount']:g} lies outside [{low:g}, {high:g}]")
-    if kind in WHOLE_FLIGHT_KINDS and not numbers.keys() <= {"amount"}:
+    if not wrong and kind in WHOLE_FLIGHT_KINDS and not numbers.keys() <= {"amount"}:
         wrong.append(f"{kind} holds {WHOLE_FLIGHT_TEXT}: leave out begin and end")
     if not wrong and numbers.get("begin", 0.0) >= numbers.get("end", 1e9):
         wrong.append("begin is not before end")

@@ -65,9 +65,10 @@ class IdentifiedParameter:
         """Return the end of the interval at which flying is harder, for a confidence level of both ends."""
         end = self.high if HARDER[self.key] else self.low
         # The interval is symmetric in the logarithm, so other levels scale the ratio by quantiles
-        # of the normal distribution.
-        ratio = max(end, 1e-12) / self.value
-        value = float(self.value * ratio ** (norm.ppf(0.5 + 0.5 * level) / norm.ppf(0.975)))
+        # of the normal distribution; beside a delay of zero the end itself.
+        share = norm.ppf(0.5 + 0.5 * level) / norm.ppf(0.975)
+        ratio = max(end, 1e-12) / self.value if self.value > 0.0 else 0.0
+        value = float(self.value * ratio**share if self.value > 0.0 else end * share)
         return min(value, 1.0) if KEY_UNITS[self.key] == "1" else value
 
 
