@@ -349,8 +349,8 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
     """Plot a formation from above, flying up the picture: up- and downwash in its mean plane, each wing with its
     drag.
 
-    The number beside a wing is its induced drag against a lone bird's: -30 % is saved. The lifting line is that of Dimock
-    & Selig 2003; the picture is ours.
+    The number beside a wing is its induced drag against a lone bird's: -30 % is saved.
+    The lifting line is that of Dimock & Selig 2003; the picture is ours.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start : instant, s; by default the last one; ax : axes to draw into, instead of a new figure
