@@ -280,7 +280,7 @@ def vocabulary() -> None:
         "overrule": "of a fault: the command that reaches the body",
         "motion": "of a fault: the velocity after a step of motion",
         "leaves": "of a fault: time from its beginning until the agent is absent, s",
-        "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines of text",
+        "errors": "of a metric set: what is wrong with its parameters beyond single ranges, as lines of text",
     }
     wrong = sorted(set(told) ^ set(VOCABULARY))
     if wrong:
