@@ -73,6 +73,7 @@ class Flight:
         self.pilot, self.land, self.lift, self.weak, self.position, self.fix = True, False, 0.0, False, True, 3
         self.silent = self.blind = self.near = self.failsafe = False
         self.jumped = False  # in flight, and nobody has released it since
+        self.called_home = False  # by an order in flight, and nobody has released it since
         self.clock, self.battery, self.heard, self.log = 0.0, 90.0, True, []
         link = self.node.autopilot_link
         link.origin, link.kind = (0.0, 0.0, 0.0), self.card.autopilot.number
@@ -94,6 +95,8 @@ class Flight:
             node.operator._obey(OperatorOrder(event, 0, self.card.mission, now, now, point), now)
             self.resumed |= event == OrderKind.RESUME
             self.jumped &= event in (OrderKind.HOLD, OrderKind.GO, OrderKind.START)
+            self.called_home |= event == OrderKind.RETURN and node.phase in FLYING_PHASES
+            self.called_home &= event not in (OrderKind.RESUME, OrderKind.GOTO)
             if event == OrderKind.START:
                 self.start_at = self.now
             elif event in CALL_OFF_ORDERS and node.phase in (P.BOOT, P.READY, P.CLEARED, P.ARMING):
@@ -219,7 +222,10 @@ class Flight:
         self.resumed &= self.z > 0.0
         if was == P.HOLD and self.jumped:
             assert phase not in (P.GATHER, P.FLOCK, P.GOTO, P.TAKEOFF), (phase, "after a jump", self.log)
+        if was == P.HOLD and self.called_home:
+            assert phase not in (P.GATHER, P.FLOCK, P.GOTO, P.TAKEOFF), (phase, "though called home", self.log)
         self.jumped &= phase in FLYING_PHASES
+        self.called_home &= phase in FLYING_PHASES
         if phase in FLYING_PHASES:
             assert self.node.autopilot_link.mode == self.card.autopilot.ours, (phase, "of a pilot", self.log)
         if self.now - self.stood_at > 1.0 and self.armed and seen and phase != P.FAULT:

@@ -185,6 +185,15 @@ def test_take_off_that_was_held_in_the_air_goes_on_to_its_layer(kind):
     assert flight.z > 9.4
 
 
+def test_drone_that_is_called_home_without_a_position_never_flocks_on():
+    """It cannot fly home then; it holds, says so, and follows the next order to return."""
+    flight = fly("ardupilot", [*STARTS[3], ("bad navigation", 3), (OrderKind.RETURN, 3), ("good navigation", 40)])
+    assert flight.node.phase == P.HOLD and flight.node.operator.held
+    flight.apply(OrderKind.RETURN)
+    flight.step()
+    assert flight.node.phase == P.RETURN
+
+
 # -------------------------------------------------------------------------------------------------------- limiter
 
 numbers = st.one_of(st.floats(-50, 50), st.floats())

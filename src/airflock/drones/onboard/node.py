@@ -231,6 +231,10 @@ class Node:
             # give it to the next one.
             if known.order in orders.CALL_OFF_ORDERS and step.row.number != "23" and self.phase in FLYING_PHASES:
                 self.operator.again(known.order)  # something else came first at this tick
+        # RETURN has ended `held`: without this the drone would flock on once it knows its place again.
+        elif known.order == OrderKind.RETURN and self.phase == MissionPhase.HOLD:
+            self.operator.held = True
+            self._notes.append("not returned: it does not know its position; it holds until the operator orders more")
         if known.order == OrderKind.GOTO and self.phase != MissionPhase.GOTO:
             self._notes.append(f"the point that was ordered is not followed in {self.phase.name}")
         # A resume must not be followed minutes later, once the pilot has taken off.
