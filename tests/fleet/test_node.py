@@ -184,6 +184,29 @@ def test_a_refusal_to_arm_is_reported_once_at_each_start_with_its_reason_within_
         ]  # fmt: skip
 
 
+def test_a_refusal_to_land_is_reported_though_one_of_the_same_mode_was_reported_before_the_flight():
+    node, vehicle = arducopter()
+    live(node, vehicle, 0.0, 4.0)
+    refused = common.MAVLink_command_ack_message(176, 4, 0, 0, 1, 191)
+    node.operator.start_at = START_TIME + 4_000_000
+    live(node, vehicle, 4.0, 5.0)
+    assert node.phase == MissionPhase.ARMING
+    assert notes_of(node, refused, now=5.0) == ["the autopilot refuses the mode: failed"]
+    live(node, vehicle, 5.2, 30.0)
+    assert node.phase == MissionPhase.FLOCK
+    node._enter(MissionPhase.LAND, "ordered to land", 30.0, node.tick(30.0))
+    assert "the autopilot refuses the mode: failed" in notes_of(node, refused, now=30.2)
+
+
+def test_an_ordinary_take_off_reports_no_refusal():
+    """By its source ArduPilot refuses TAKEOFF once its motors have spooled up."""
+    node, vehicle = arducopter()
+    live(node, vehicle, 0.0, 4.0)
+    node.operator.start_at = START_TIME + 4_000_000
+    notes = live(node, vehicle, 4.0, 30.0)
+    assert node.phase == MissionPhase.FLOCK and not [note for note in notes if "refuses" in note], notes
+
+
 @pytest.mark.parametrize(("message", "notes"), [
     (common.MAVLink_command_ack_message(400, 4, 0, 0, 1, 190), []),  # of a ground station
     (common.MAVLink_command_ack_message(400, 5, 0, 0, 1, 191), []),  # in progress
@@ -277,8 +300,26 @@ def test_the_later_name_of_a_parameter_counts_as_the_parameter(value, is_safe):
     vehicle.parameters["MAV_GCS_SYSID"] = value
     notes = live(node, vehicle, 0.0, 4.0)
     assert (node.phase == MissionPhase.CLEARED) == is_safe
-    line = "missing: SYSID_MYGCS or MAV_GCS_SYSID = 255 is not within [1, 1]"
+    line = "missing: MAV_GCS_SYSID = 255 is not within [1, 1]"
     assert any(note.startswith(line) for note in notes) != is_safe, notes
+
+
+LATER_UNITS = {"WP_ACC": 0.01, "WP_SPD": 0.01}  # m, where Copter 4.6 has cm
+LATER_NAMES = [(check.name, name) for check in AUTOPILOTS["ardupilot"].parameter_checks for name in check.later_names]
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+@pytest.mark.parametrize(("name", "later"), [names for names in LATER_NAMES if names[0] != "SYSID_MYGCS"])
+def test_a_limit_under_its_later_name_and_unit_counts_as_the_limit(name, later, share):
+    """Copter 4.7 has renamed them, some from one patch release to the next; under one name alone it never arms."""
+    node, vehicle = arducopter()
+    vehicle.parameters[later] = share * vehicle.parameters.pop(name) * LATER_UNITS.get(later, 1.0)
+    vehicle.parameters = {key: vehicle.parameters[key] for key in sorted(vehicle.parameters)}
+    notes = live(node, vehicle, 0.0, 4.0)
+    needed = {check.name: check.low for check in node.card.parameter_checks}[name]
+    slow = vehicle.parameters[later] / LATER_UNITS.get(later, 1.0) < needed
+    assert (node.phase == MissionPhase.CLEARED) != slow, notes
+    assert any(note.startswith(f"missing: {later} = ") and "is not at least" in note for note in notes) == slow, notes
 
 
 def test_the_numbers_that_the_per_cent_of_a_battery_rest_on_are_reported():

@@ -40,7 +40,8 @@ class ParameterCheck(NamedTuple):
     own          : the safe value is the autopilot's own system id
     timeout      : time-out (s) during which the drone flies on; `reason` adds the distance of that flight; 0: none
     unsafe_value : a value inside the range that is not safe
-    later_name   : its name in later versions of the autopilot
+    later_names  : its names in later versions of the autopilot
+    later_unit   : unit of its value under a later name, in units of `name`
     limits       : what of the drone's response it limits: accel (m/s²), jerk (m/s³) or speed (m/s); the card says what
                    is needed, and `scale` is its unit
     """
@@ -52,18 +53,26 @@ class ParameterCheck(NamedTuple):
     own: bool = False
     timeout: float = 0.0
     unsafe_value: float | None = None
-    later_name: str = ""
+    later_names: tuple[str, ...] = ()
+    later_unit: float = 1.0
     limits: str = ""
     scale: float = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return all names under which an autopilot may report it."""
-        return (self.name, self.later_name) if self.later_name else (self.name,)
+        return (self.name, *self.later_names)
 
     def value(self, parameters: Mapping[str, float]) -> float | None:
         """Return its value among those that an autopilot has reported; None if it has not."""
         return next((parameters[name] for name in self.names if name in parameters), None)
+
+    def as_reported(self, parameters: Mapping[str, float]) -> "ParameterCheck":
+        """Return the check under the name, and in the unit, of an autopilot that has reported these parameters."""
+        later = next((name for name in self.later_names if name in parameters), None)
+        if later is None or self.name in parameters:
+            return self
+        return self._replace(name=later, low=self.low / self.later_unit, high=self.high / self.later_unit)
 
     def reaching(self, needed: float) -> "ParameterCheck":
         """Return the check for a card that relies on a limit of at least `needed`, in SI units."""
@@ -194,11 +203,37 @@ AUTOPILOTS = {
                 250.0,
                 "whose heartbeats count: those of the node, of the same system",
                 own=True,
-                later_name="MAV_GCS_SYSID",  # since Copter 4.7
+                later_names=("MAV_GCS_SYSID",),  # since Copter 4.7, as all later names here
             ),
-            ParameterCheck("WPNAV_ACCEL", 0.0, math.inf, f"cm/s^2; {RELIED_ON}", limits="accel", scale=100.0),
-            ParameterCheck("PSC_JERK_XY", 0.0, math.inf, f"m/s^3; {RELIED_ON}", limits="jerk"),
-            ParameterCheck("WPNAV_SPEED", 0.0, math.inf, f"cm/s; {RELIED_ON}", limits="speed", scale=100.0),
+            ParameterCheck(
+                "WPNAV_ACCEL",
+                0.0,
+                math.inf,
+                f"in cm/s^2 (WP_ACC: m/s^2); {RELIED_ON}",
+                limits="accel",
+                scale=100.0,
+                later_names=("WP_ACC",),
+                later_unit=100.0,
+            ),
+            # Copter 4.7.0 and 4.7.1 name it differently.
+            ParameterCheck(
+                "PSC_JERK_XY",
+                0.0,
+                math.inf,
+                f"m/s^3; {RELIED_ON}",
+                limits="jerk",
+                later_names=("PSC_JERK_NE", "PSC_NE_JERK"),
+            ),
+            ParameterCheck(
+                "WPNAV_SPEED",
+                0.0,
+                math.inf,
+                f"in cm/s (WP_SPD: m/s); {RELIED_ON}",
+                limits="speed",
+                scale=100.0,
+                later_names=("WP_SPD",),
+                later_unit=100.0,
+            ),
         ),
         battery_parameters={
             "BATT_CAPACITY": "capacity in mAh, on which its per cent rest: is it that of this battery?",

@@ -114,14 +114,14 @@ def missing_before_start(
 def _missing_parameters(card: FlightCard, member: int, wire: AutopilotLink) -> list[str]:
     """Return the parameters of the autopilot that are unknown or unsafe."""
     missing = []
-    for guard in card.parameter_checks:
-        name, value = " or ".join(guard.names), guard.value(wire.parameters)
+    for check in card.parameter_checks:
+        value, guard = check.value(wire.parameters), check.as_reported(wire.parameters)
         if value is None:
-            missing.append(f"{name}: the autopilot has not reported it")
+            missing.append(f"{' or '.join(check.names)}: the autopilot has not reported it")
             continue
         if not guard.safe(value, member):
             why = guard.reason(card.safety.speed_max, card.safety.response + card.safety.delay)
-            missing.append(f"{name} = {value:g} is not {guard.told(member)}: {why}")
+            missing.append(f"{guard.name} = {value:g} is not {guard.told(member)}: {why}")
     return missing
 
 
