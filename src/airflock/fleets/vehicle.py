@@ -531,7 +531,9 @@ class SoftwareVehicle:
         return RESULT_ACCEPTED, []
 
     def _take_off(self, altitude: float) -> int:
-        if not self.armed or (self.kind == "ardupilot" and self.mode != GUIDED):
+        # By its source ArduPilot refuses a second take-off once its motors have spooled up.
+        spooled = self.flying or (self.is_taking_off and self.now >= self._lifts_at)
+        if not self.armed or (self.kind == "ardupilot" and (self.mode != GUIDED or spooled)):
             return RESULT_DENIED if self.kind == "px4" else RESULT_FAILED
         if self.kind == "ardupilot" and not self.is_taking_off:
             self._lifts_at = self.now + SPOOL_SECONDS

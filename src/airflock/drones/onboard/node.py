@@ -324,6 +324,10 @@ class Node:
                 out.autopilot.append(self._speaker.arm(False))
         if was == MissionPhase.ARMING and to == MissionPhase.TAKEOFF:
             self._takeoff_at, self._overload_count = now, 0
+            self.autopilot_link.accepted.discard(TAKE_OFF_COMMAND)
+        # A refusal to land is news, though one of the same mode was reported before the flight.
+        if to not in PREFLIGHT_PHASES:
+            self.autopilot_link.reported_lines.clear()
         self.operator.held &= to != MissionPhase.GOTO
         if to in (MissionPhase.FLOCK, MissionPhase.GOTO) and was not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             self._phase_velocity.begin(now)
@@ -386,7 +390,8 @@ class Node:
         # Setpoints would end the climb that ArduPilot flies by itself; after a HOLD they lift it.
         first_climb = self._phase_since == self._takeoff_at
         if phase == MissionPhase.TAKEOFF and first_climb and not self.card.autopilot.takes_off_by_setpoints:
-            if self._may_retry(now):
+            # Once it spools up ArduPilot refuses another one: each ordinary take-off would report a refusal.
+            if TAKE_OFF_COMMAND not in self.autopilot_link.accepted and self._may_retry(now):
                 out.autopilot.append(say.command(TAKE_OFF_COMMAND, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self._climb_height()))
             return
         self._stream_since = now if self._stream_since is None else self._stream_since

@@ -260,6 +260,7 @@ class AutopilotLink:
     prearm_fails  : it reports that it would not arm
     battery_warning : a line if it reports a bad battery (by voltage or capacity); else empty
     lines         : its texts and refusals that nobody has read yet
+    accepted      : numbers of the commands of COMMAND_TEXTS that it has accepted
     explained_offset : offset (s) of its clock from ours, which other drones confirmed
     other_systems : system ids of other autopilots on this wire
     """
@@ -282,6 +283,7 @@ class AutopilotLink:
         self.reported_lines: deque[str] = deque(maxlen=REPORTED_LINES)
         self._pieces, self.explained_offset = TextPieces(), 0.0
         self.jumped_at = -1e9
+        self.accepted: set[int] = set()
         self.parameters: dict[str, float] = {}
         self.clock_offsets: list[float] = []
         self.other_systems: set[int] = set()
@@ -376,7 +378,9 @@ class AutopilotLink:
 
     def _acknowledged(self, v: dict[str, Any], now: float, utc: int) -> bool:
         ours = v["target_system"] in (0, self._member) and v["target_component"] in (0, NODE_COMPONENT)
-        if ours and v["command"] in COMMAND_TEXTS and v["result"] not in ACCEPTED_RESULTS:
+        if ours and v["command"] in COMMAND_TEXTS and v["result"] in ACCEPTED_RESULTS:
+            self.accepted.add(v["command"])
+        elif ours and v["command"] in COMMAND_TEXTS:
             known = common_dialect().enums["MAV_RESULT"].get(v["result"])
             result = known.name.removeprefix("MAV_RESULT_").lower().replace("_", " ") if known else v["result"]
             self.report(f"the autopilot refuses {COMMAND_TEXTS[v['command']]}: {result}")
