@@ -316,7 +316,6 @@ class Node:
         if to == MissionPhase.ARMING:
             assert self.autopilot_link.state is not None
             self.operator.held = self.operator.resume_ordered = False
-            self.autopilot_link.reported_lines.clear()
             self.home = (self.autopilot_link.state.x, self.autopilot_link.state.y, self.card.layer(self.member))
         if was not in PREFLIGHT_PHASES and to == MissionPhase.READY:
             self.operator.start_at = None
