@@ -581,7 +581,16 @@ def test_another_autopilot_is_a_fault():
     other = SoftwareVehicle(
         "px4", 4, CARD.site, (0.0, 0.0, 0.0), SCENARIO.body.rule, SCENARIO.body.numbers, started=START_TIME
     )
-    assert any("calls itself system 4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == MissionPhase.FAULT
+    assert any("calls itself system 4" in n for n in live(node, other, 0.0, 4.0)) and node.phase == MissionPhase.FAULT
+
+
+def test_another_vehicle_on_the_wire_that_is_heard_first_is_no_fault():
+    """Its heartbeat may come before that of the own autopilot, as that of an antenna tracker."""
+    node, vehicle = node_with_vehicle()
+    heartbeat = common.MAVLink_heartbeat_message(5, 3, 1, 0, 4, 3)
+    assert notes_of(node, heartbeat, now=0.0, system=4) == [] and node.phase == MissionPhase.BOOT
+    live(node, vehicle, 0.2, 4.0)
+    assert node.phase == MissionPhase.READY
 
 
 def test_two_drones_with_one_number_do_not_start():

@@ -201,11 +201,15 @@ def state_distance(a: State, b: State) -> float:
     return float(norm(a.x - b.x, a.y - b.y, a.z - b.z))
 
 
-def permanent_error(card: FlightCard, member: int, link: AutopilotLink, has_twin: bool) -> str:
-    """Return the error that no waiting can mend; empty if there is none."""
+def permanent_error(card: FlightCard, member: int, link: AutopilotLink, has_twin: bool, silent_for: float) -> str:
+    """Return the error that no waiting can mend; empty if there is none.
+
+    silent_for : time for which the own autopilot has not been heard since the node began, s
+    """
     if link.kind is not None and link.kind != card.autopilot.number:
         return f"the autopilot is of kind {link.kind}; the card is for {card.autopilot.name} ({card.autopilot.number})"
-    if link.kind is None and link.other_systems:
+    # Another vehicle on this wire may just be heard first, such as an antenna tracker.
+    if link.kind is None and link.other_systems and silent_for > MAX_HEARTBEAT_AGE:
         systems = ", ".join(map(str, sorted(link.other_systems)))
         return f"the autopilot calls itself system {systems}; this drone is member {member}"
     return f"another sender signs as member {member}: two drones with one number?" if has_twin else ""
@@ -249,7 +253,8 @@ def mission_facts(
         if phase in (MissionPhase.READY, MissionPhase.CLEARED)
         else ()
     )
-    if timers("silent", phase == MissionPhase.BOOT and not alive, now) > MAX_HEARTBEAT_AGE:
+    silent_for = timers("silent", phase == MissionPhase.BOOT and not alive, now)
+    if silent_for > MAX_HEARTBEAT_AGE:
         missing = (NO_HEARTBEAT_TEXT,)
     # An unknown battery keeps a drone on the ground; in the air it must not land everybody at once.
     battery = 100.0 if link.battery is None else link.battery
@@ -286,7 +291,7 @@ def mission_facts(
         is_overloaded=tick.is_overloaded,
         overload_count=tick.overload_count,
         present=alive and link.kind == card.autopilot.number and link.armed is not None,
-        fault=permanent_error(card, member, link, tick.has_twin),
+        fault=permanent_error(card, member, link, tick.has_twin, silent_for),
         missing=missing,
         due=operator.due(tick.utc, card.turn(member)),
         setpoints_for=tick.setpoints_for,
