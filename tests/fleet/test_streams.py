@@ -264,6 +264,17 @@ def test_frozen_position_is_no_slow_stream():
     assert both.node.phase == P.HOLD and both.record.first("10 needed") is None
 
 
+@pytest.mark.parametrize("gap", [0.4, 1.4, 1.9, 3.0])
+@pytest.mark.parametrize("rate", [10.0, 20.0])
+def test_single_gap_in_a_fast_stream_is_no_slow_stream(rate, gap):
+    both = Beside()
+    both.vehicle.rates["local"] = rate
+    both.live(5.0)
+    both.vehicle.due["local"] = both.now + gap
+    both.live(gap + 4.0, insists={"local": rate})
+    assert both.record.first("needed: is MAVProxy between?") is None, both.record.notes[-4:]
+
+
 def test_line_whose_figure_alone_changes_is_written_once():
     both = Beside()
     both.vehicle.battery = 20.0

@@ -5,6 +5,7 @@ nothing.
 """
 
 from collections import deque
+from itertools import pairwise
 from math import isfinite, sqrt
 from typing import Any
 
@@ -332,7 +333,11 @@ class AutopilotLink:
             return None
         # Up to the last arrival: a fast stream that has ended is not slow.
         span = latest[-1] - latest[0]
-        if span < 0.5 * RATE_SPAN or len(latest) >= needed * RATE_SHARE * span:
+        if span < 0.5 * RATE_SPAN:
+            return None
+        # Without its longest gap: one hiccup of a computer is no slow stream.
+        span -= max(b - a for a, b in pairwise(latest))
+        if len(latest) - 1 >= needed * RATE_SHARE * span:
             return None
         # The last arrivals alone: when a fast stream becomes slow, an average says neither rate.
         latest = latest[-FIGURE_COUNT:]
