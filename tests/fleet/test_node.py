@@ -278,6 +278,17 @@ def test_a_jump_behind_a_silence_is_a_jump():
         assert node.autopilot_link.is_position_doubtful(1.8 + seconds) == jumps, (seconds, step)
 
 
+@pytest.mark.parametrize(("speed", "apart"), [(12.0, 0.0), (-12.0, 0.0), (12.0, 4.0), (12.0, 6.0)])
+@pytest.mark.parametrize("gap", [-0.45, 0.0, 0.45])
+def test_two_positions_are_compared_at_one_time(speed, apart, gap):
+    """A fast drone is elsewhere when the next message comes; that is no jump, which only an operator ends."""
+    link = node_with_vehicle()[0].autopilot_link
+    at, later = State(3.0, 2.0, 20.0, speed, 0.0, 0.0), State(3.0 + speed * gap + apart, 2.0, 20.0, speed, 0.0, 0.0)
+    link.state, link.state_at, link.global_state, link.global_at = at, 9.5, later, 9.5 + gap
+    now = max(9.5, 9.5 + gap)
+    assert link.position_disagreement(now) == pytest.approx(apart) and link.is_position_doubtful(now) == (apart > 5.0)
+
+
 def test_after_a_jump_a_drone_holds_until_the_operator_resumes_though_both_positions_agree_again():
     f = fleet(scenario(3, duration=300.0))
     f.advance(12.0)
