@@ -66,7 +66,7 @@ def own_status(
 
 # ---- Node
 
-QUANTITY = re.compile(r"[-+]?\d+(\.\d+)? (?=Hz|m|km|s|%)")
+QUANTITY = re.compile(r"[-+]?\d+(\.\d+)? (?=Hz|m|km|s|V|%)")
 RETRY_PERIOD = 1.0  # s between two tries of a command
 KILL_SECONDS = 3.0  # s at least for which a kill is repeated to an autopilot that is armed
 MAX_UNSENT_LINES = 64  # lines for a person that wait for the radio
