@@ -441,6 +441,31 @@ def test_only_a_fresh_order_of_the_operator_counts_and_only_once():
     assert not again.operator.held, "the same order after a restart"
 
 
+@pytest.mark.parametrize(("off", "line"), [
+    (3_000_000, "packets of the operator are refused: they are from 3.0 s in the future"),
+    (-8_000_000, "packets of the operator are refused: they are from 8.0 s in the past"),
+    (100_000, None),
+])  # fmt: skip
+def test_an_order_by_a_clock_that_is_off_is_refused_with_one_line(off, line):
+    node, _ = node_with_vehicle()
+    for k in range(3):
+        node.radio(order(OrderKind.HOLD, given=START_TIME + off + 1000 * k), 0.0)
+    notes = node.tick(0.2).notes
+    assert node.operator.held == (line is None)
+    assert len(notes) == (line is not None) and all(note.startswith(line) for note in notes), notes
+
+
+def test_an_order_of_another_operator_is_refused_with_one_line_and_a_repeated_one_with_none():
+    node, _ = node_with_vehicle()
+    for _ in range(2):
+        node.radio(order(OrderKind.HOLD, given=START_TIME + 100_000), 0.0)
+    assert node.tick(0.2).notes == []
+    for k in range(3):
+        node.radio(order(OrderKind.LAND, private=new_operator_keys()[0], given=START_TIME + 200_000 + k), 0.2)
+    (note,) = node.tick(0.4).notes
+    assert note.startswith("an order is refused: the operator of this card has not signed it")
+
+
 def test_a_kill_takes_two_steps():
     node, _ = node_with_vehicle()
     node.radio(order(OrderKind.CONFIRM_KILL, given=START_TIME + 100_000), 0.1)

@@ -152,6 +152,7 @@ class PacketReceiver:
         self._last_datagrams: dict[int, bytes] = {}  # system → the last datagram of it that was accepted
         self.refused = dict.fromkeys(PACKET_REFUSALS, 0)
         self.accepted_count = 0
+        self.clock_differences: dict[int, float] = {}  # s; of senders of whom nothing but such packets came
         self.own_id_stamp: int | None = None  # stamp of the last genuine, fresh frame that bears our own system id
 
     def __call__(self, datagram: bytes, utc: int) -> ReceivedMessage | None:
@@ -163,6 +164,9 @@ class PacketReceiver:
             # the node decides which.
             if reason == "own":
                 self.own_id_stamp = _datagram_stamp(datagram)
+            elif reason == "clock" and datagram[5] not in self._last_datagrams:
+                difference = _datagram_stamp(datagram) - stamp_of_time(utc)
+                self.clock_differences[datagram[5]] = difference / STAMPS_PER_SECOND
             return None
         system, stamp, message = datagram[5], _datagram_stamp(datagram), message_number(datagram)
         self.heard[system] = stamp

@@ -23,7 +23,7 @@ from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketReceiver, PacketSigner
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import FLYING_PHASES, NOT_FLOCKING_PHASES, MissionFacts, MissionPhase, next_step
-from airflock.drones.onboard.peers import AutopilotLink, OperatorOrders, Peers
+from airflock.drones.onboard.peers import ORDER_REFUSALS, AutopilotLink, OperatorOrders, Peers
 from airflock.drones.onboard.situation import ConditionTimers, NodeTick, mission_facts
 from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseVelocity, SteeringInput, Velocity
 
@@ -138,6 +138,7 @@ class Node:
         self._overload_count = 0
         self._standing_velocity: Velocity | None = None  # what keeps it where it stopped for somebody who is not heard
         self._reported_missing: tuple[str, ...] = ()
+        self._reported_refusals: set[int | str] = set()  # system ids of wrong clocks, reasons of orders
         self._notes: list[str] = []
         self._unsent_lines: deque[tuple[int, str]] = deque(maxlen=MAX_UNSENT_LINES)
         self._line_number = 0
@@ -170,9 +171,13 @@ class Node:
             if stamp is not None and stamp not in self._signer.recent_stamps and not self._has_twin:
                 self._has_twin = True
                 self._notes.append(f"another sender signs as member {self.member}")
+            self._report_wrong_clocks()
             return
         if got.message == orders.TUNNEL_MESSAGE:
-            self.operator.take(got.values, now, utc)
+            reason = "" if self.operator.take(got.values, now, utc) else self.operator.last_refusal
+            if reason and ORDER_REFUSALS[reason] and reason not in self._reported_refusals:
+                self._reported_refusals.add(reason)
+                self._notes.append(f"an order is refused: {ORDER_REFUSALS[reason]}")
             return
         status = parse_status_payload(got.payload, self.card.site)
         if status is None:
@@ -188,6 +193,17 @@ class Node:
                 )
             else:
                 self.pilot.forget(index)
+
+    def _report_wrong_clocks(self) -> None:
+        """Note once whose packets are all refused for their time: such an order has no effect."""
+        for system, seconds in self._receiver.clock_differences.items():
+            if system not in self._reported_refusals and system != self.member:
+                self._reported_refusals.add(system)
+                who = "the operator" if system == orders.OPERATOR_SYSTEM else f"drone {system}"
+                self._notes.append(
+                    f"packets of {who} are refused: they are from {abs(seconds):.1f} s in the "
+                    f"{'future' if seconds > 0.0 else 'past'} by this computer's clock; one of the two clocks is wrong"
+                )
 
     @property
     def memory(self) -> NodeMemory:

@@ -139,7 +139,14 @@ KILL_CONFIRM_WITHIN = 5_000_000  # µs; a kill must be confirmed within
 MAX_ORDER_AGE = 5_000_000  # µs; an order given longer ago is not obeyed
 # µs after its turn a drone may still start; our choice: later somebody may stand beside it.
 MAX_START_DELAY = 10_000_000
-ORDER_REFUSALS = ("seal", "mission", "old", "replay", "no library")
+# Reasons to refuse an order, with a line for a person; a repetition is none.
+ORDER_REFUSALS = {
+    "seal": "the operator of this card has not signed it; is mission.operator another one?",
+    "mission": "it is of another mission",
+    "old": f"by this computer's clock it was given more than {MAX_ORDER_AGE * 1e-6:g} s ago, or in the future",
+    "replay": "",
+    "no library": "cryptography is not installed on board, so it cannot be checked",
+}
 
 
 class OperatorOrders:
@@ -152,6 +159,7 @@ class OperatorOrders:
         self._card, self._member, self.last_order_time = card, member, last_order_time
         self.heard_at = -1e9
         self.refused = dict.fromkeys(ORDER_REFUSALS, 0)
+        self.last_refusal = ""  # reason of the last refused order
         self.start_at: int | None = None  # µs of Unix time
         self.held = self.resume_ordered = self.kill_confirmed = False
         self.goal: tuple[float, float, float] | None = None
@@ -180,7 +188,7 @@ class OperatorOrders:
         return True
 
     def _refuse(self, reason: str) -> bool:
-        self.refused[reason] += 1
+        self.refused[reason], self.last_refusal = self.refused[reason] + 1, reason
         return False
 
     def _obey(self, order: OperatorOrder, utc: int) -> None:
