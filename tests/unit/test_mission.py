@@ -10,7 +10,15 @@ from airflock.core.contract import State
 from airflock.core.maths import braking_curve
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.card import SafetyLimits
-from airflock.drones.onboard.mission import FLYING_PHASES, MISSION_TABLE, MissionFacts, MissionPhase, next_step
+from airflock.drones.onboard.mission import (
+    AIRBORNE_PHASES,
+    FLYING_PHASES,
+    MISSION_TABLE,
+    MissionFacts,
+    MissionPhase,
+    next_step,
+)
+from airflock.drones.onboard.node import own_status
 from airflock.drones.onboard.steering import limit_velocity
 from mission_events import EVENTS, fly
 
@@ -73,7 +81,7 @@ ROWS = [
     (
         "27",
         P.LAND,
-        {"is_landed": True, "in_land_mode": True},
+        {"is_landed": True, "in_land_mode": True, "is_high": False},
         P.DONE,
         {"is_landed": False, "kill_confirmed": True},
         P.DONE,
@@ -192,6 +200,24 @@ def test_drone_that_is_called_home_without_a_position_never_flocks_on():
     flight.apply(OrderKind.RETURN)
     flight.step()
     assert flight.node.phase == P.RETURN
+
+
+@pytest.mark.parametrize("ticks", [1, 5, 30])
+def test_drone_whose_autopilot_reports_the_ground_in_the_air_is_seen_by_the_others(ticks):
+    """They do not avoid whom they take to stand; it lands, and no tick of it is unseen."""
+    flight = fly("ardupilot", STARTS[3])
+    link, report = flight.node.autopilot_link, flight._report
+
+    def report_the_ground():
+        report()
+        link.is_landed = True
+
+    flight._report = report_the_ground
+    for _ in range(ticks):
+        flight.step()
+        status = own_status(flight.card, link, link.state, 0, flight.node.phase, peers=1)
+        assert flight.z > 10.0 and status.is_airborne and flight.node.phase in AIRBORNE_PHASES, flight.log[-3:]
+    assert (flight.node.phase == P.LAND) == (ticks == 30)
 
 
 # -------------------------------------------------------------------------------------------------------- limiter

@@ -381,7 +381,7 @@ MISSION_TABLE: tuple[Row, ...] = (
         "27",
         _phases(_P.LAND),
         "landed",
-        lambda f, s: not f.armed or (f.is_landed and f.in_land_mode and f.has_flown),
+        lambda f, s: not f.armed or (f.is_landed and f.in_land_mode and f.has_flown and not f.is_high),
         _P.DONE,
     ),
 )

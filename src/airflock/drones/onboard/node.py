@@ -49,13 +49,15 @@ def own_status(
 ) -> DroneStatus:
     """Return the own status at a time (µs of Unix time), with the number of peers that are heard."""
     offset = link.unexplained_offset
+    # A report of the ground may be false or missing: whom the others take to stand, they fly into.
+    is_airborne = link.is_landed is False or (bool(link.armed) and own.z > card.low)
     return DroneStatus(
         time=time,
         position=own[:3],
         velocity=own[3:],
         accuracy=min(link.horizontal_accuracy, 65.0),
         phase=int(phase),
-        is_airborne=link.is_landed is False,
+        is_airborne=is_airborne,
         mission=card.mission,
         card=bytes.fromhex(card.hash)[:4],
         battery=round(link.battery or 0.0),
