@@ -335,6 +335,16 @@ def test_a_limit_under_its_later_name_and_unit_counts_as_the_limit(name, later, 
     assert any(note.startswith(f"missing: {later} = ") and "is not at least" in note for note in notes) == slow, notes
 
 
+def test_what_is_to_be_set_is_written_in_the_unit_of_each_name():
+    lines = [check.instruction() for check in arducopter()[0].card.parameter_checks if check.later_names]
+    assert lines == [
+        "SYSID_MYGCS or MAV_GCS_SYSID to the own system id",
+        "WPNAV_ACCEL at least 480 (Copter 4.7: WP_ACC at least 4.8)",
+        "PSC_JERK_XY or PSC_JERK_NE or PSC_NE_JERK at least 16",
+        "WPNAV_SPEED at least 480 (Copter 4.7: WP_SPD at least 4.8)",
+    ]
+
+
 def test_the_numbers_that_the_per_cent_of_a_battery_rest_on_are_reported():
     node, vehicle = arducopter()
     vehicle.parameters["BATT_CAPACITY"] = 3300.0

@@ -423,7 +423,7 @@ def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None
         terminal.print_message(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
     for guard in card.parameter_checks:
         why = guard.reason(card.safety.speed_max, card.safety.response + card.safety.delay)
-        terminal.print_message(f"set {' or '.join(guard.names)} {guard.told()}: {why}")
+        terminal.print_message(f"set {guard.instruction()}: {why}")
     for name, meaning in card.autopilot.battery_parameters.items():
         terminal.print_message(f"look at {name}: {meaning}")
 

@@ -91,6 +91,13 @@ class ParameterCheck(NamedTuple):
             return f"at least {low:g}"
         return f"within [{low:g}, {high:g}]" + ("" if self.unsafe_value is None else f", not {self.unsafe_value:g}")
 
+    def instruction(self) -> str:
+        """Return names and safe values in words, for a person who sets them: each name in its own unit."""
+        if self.later_unit == 1.0:
+            return f"{' or '.join(self.names)} {self.told()}"
+        later = [f"{name} {self.as_reported({name: 0.0}).told()}" for name in self.later_names]
+        return f"{self.name} {self.told()} (Copter 4.7: {', '.join(later)})"
+
     def safe(self, value: float, member: int) -> bool:
         """Return True if a value is safe for a member of a flock."""
         low, high = self.range(member)

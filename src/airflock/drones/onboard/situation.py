@@ -89,7 +89,7 @@ def bad_streams(card: FlightCard, link: AutopilotLink, now: float) -> tuple[str,
     if rate is not None:
         lines.append(
             f"own position at {rate:.1f} Hz, {needed:g} needed: is MAVProxy between? Start it with --streamrate=-1; "
-            "other ground stations and the SRn_ parameters set such rates, too"
+            "other ground stations and the SRn_ (Copter 4.7: MAVn_) parameters set such rates, too"
         )
     return tuple(lines)
 
