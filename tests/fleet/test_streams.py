@@ -216,6 +216,17 @@ def test_each_stream_that_ends_for_good_is_reported_and_nothing_arms(name):
     assert both.record.first("the autopilot has sent none for 5 s") is not None
 
 
+def test_heartbeats_that_end_while_streams_go_on_are_reported_and_nothing_arms():
+    both = Beside()
+    both.live(5.0)
+    assert both.live(4.0, insists={"heartbeat": 0.0}) == P.READY
+    assert both.record.first("missing: no heartbeat from the autopilot") is not None
+    both.order(OrderKind.START)
+    both.live(5.0, insists={"heartbeat": 0.0})
+    assert P.ARMING not in {phase for _, phase in both.record.phases}
+    assert both.live(3.0, insists={"heartbeat": 1.0}) in (P.CLEARED, P.ARMING), "and cleared once they are back"
+
+
 def test_streams_that_end_in_the_air_are_requested_again_and_the_flight_goes_on():
     both = Beside().in_the_air()
     both.vehicle.rates |= SILENT

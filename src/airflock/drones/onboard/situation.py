@@ -147,6 +147,9 @@ def _missing_state(card: FlightCard, wire: AutopilotLink, now: float) -> list[st
         )
     elif wire.position_disagreement(now) > s.jump:
         missing.append(f"local and global position of the autopilot differ by {wire.position_disagreement(now):.0f} m")
+    # Its streams may go on without it, through a router; a start would then end at once.
+    if now - wire.heartbeat_at > MAX_HEARTBEAT_AGE:
+        missing.append(NO_HEARTBEAT_TEXT)
     if wire.origin is None and not far:
         missing.append("GPS_GLOBAL_ORIGIN: the autopilot has not reported it")
     if wire.fix_type < 3 or wire.horizontal_accuracy > s.h_acc:
