@@ -227,6 +227,16 @@ def test_heartbeats_that_end_while_streams_go_on_are_reported_and_nothing_arms()
     assert both.live(3.0, insists={"heartbeat": 1.0}) in (P.CLEARED, P.ARMING), "and cleared once they are back"
 
 
+def test_start_that_ends_before_the_take_off_names_the_reason():
+    both = Beside()
+    both.live(5.0)
+    both.order(OrderKind.START)
+    assert both.live(0.5) == P.ARMING
+    both.now += 1.4  # the computer was overloaded
+    assert both.live(0.05) == P.READY
+    assert both.record.first("ARMING → READY: a reason to hold, before it took off: overloaded") is not None
+
+
 def test_streams_that_end_in_the_air_are_requested_again_and_the_flight_goes_on():
     both = Beside().in_the_air()
     both.vehicle.rates |= SILENT

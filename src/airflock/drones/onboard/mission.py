@@ -99,6 +99,7 @@ class MissionFacts(NamedTuple):
     time_over: bool = False
     member_joined: bool = False
     calm_for: float = 1.0  # since no reason to hold is left; 0: there is one
+    reasons_to_hold: tuple[str, ...] = ()  # in words
     at_home: bool = False
     phase_before_hold: MissionPhase = MissionPhase.FLOCK  # where HOLD came from
 

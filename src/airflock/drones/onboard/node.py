@@ -244,7 +244,8 @@ class Node:
         self._phase_velocity.failed = False
         step = next_step(self.phase, known, self.card.safety)
         if step.row is not None:
-            self._enter(step.next_phase, step.row.event, now, out)
+            reasons = f": {', '.join(known.reasons_to_hold)}" if step.row.number == "19d" else ""
+            self._enter(step.next_phase, step.row.event + reasons, now, out)
             # The row that fired has changed the phase, and the order would be lost with this tick:
             # give it to the next one.
             if known.order in orders.CALL_OFF_ORDERS and step.row.number != "23" and self.phase in FLYING_PHASES:

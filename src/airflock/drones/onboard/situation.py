@@ -243,11 +243,19 @@ def mission_facts(
     near = own is not None and _is_anybody_near(own, fresh.values(), s.near)
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
     # Hysteresis: HOLD ends only after all reasons have been absent for a while (row 25).
-    calm = not (position_bad or gnss_bad or few or clock_bad or near or tick.is_overloaded)
-    calm = calm and not (operator_lost and s.operator_lost == "hold")
     streams = bad_streams(card, link, now)
-    # The way home can be flown by slow streams: standing until the battery ends is worse.
-    calm = calm and (not streams or tick.phase_before_hold == MissionPhase.RETURN)
+    reasons_to_hold = {
+        "no valid position": position_bad,
+        "bad navigation": gnss_bad,
+        "too few neighbours": few,
+        "a suspicious clock": clock_bad,
+        "a neighbour is near": near,
+        "overloaded": tick.is_overloaded,
+        "the operator is lost": operator_lost and s.operator_lost == "hold",
+        # The way home can be flown by slow streams: standing until the battery ends is worse.
+        "slow or silent streams": streams and tick.phase_before_hold != MissionPhase.RETURN,
+    }
+    calm = not any(reasons_to_hold.values())
     # What was said of the ground before its stream ended need not hold.
     landed = link.is_landed if now - link.arrivals.get(LANDED_MESSAGE, now) <= STREAM_SILENCE else None
     stands = landed is True and phase in FLYING_PHASES and phase != MissionPhase.TAKEOFF
@@ -306,6 +314,7 @@ def mission_facts(
         time_over=tick.time_over,
         member_joined=peers.member_joined,
         calm_for=timers("calm", calm, now),
+        reasons_to_hold=tuple(reason for reason, holds in reasons_to_hold.items() if holds),
         at_home=own is not None and tick.home is not None and _is_at_home(card, own, tick.home, layer),
         phase_before_hold=tick.phase_before_hold,
     )
