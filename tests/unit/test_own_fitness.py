@@ -86,6 +86,12 @@ def test_a_flight_for_which_fitness_fails_is_a_failed_one_and_a_mended_file_goes
         assert {**mended.document()} == {**fresh.document()} and not mended.reasons
 
 
+def test_a_fitness_that_leaves_python_is_one_line(tmp_path):
+    path = study_file(tmp_path, "def mine(values):\n    raise SystemExit(3)\n", 'maximise = "mine"')
+    with pytest.raises(StudyError, match="obj.py:2: SystemExit: 3"):
+        airflock.evolve(path, tmp_path / "a", trust=True, **SHORT)
+
+
 def test_another_fitness_is_named_where_it_differs_and_goes_on_only_with_resume(tmp_path):
     path = study_file(tmp_path, SAFE.format(1.0), 'maximise = "mine"')
     airflock.evolve(path, tmp_path / "a", trust=True, **SHORT | {"generations": 1})

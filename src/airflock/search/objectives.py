@@ -86,7 +86,7 @@ def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) ->
     """
     try:
         return float(function(values)), "", False
-    except Exception as error:  # the user's own function may fail in any way
+    except (Exception, SystemExit) as error:  # the user's own function may fail in any way
         last = traceback.extract_tb(error.__traceback__)[-1]
         code = getattr(function, "__code__", None)
         place = f"{last.filename}:{last.lineno}"
