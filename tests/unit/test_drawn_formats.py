@@ -465,6 +465,14 @@ def array_of_individuals_first(rng, tmp_path):
     return tmp_path / "a.npy", {"fps": 10.0, "unit": "m"}, "individuals first? Exchange the axes"
 
 
+@question
+def array_of_individuals_on_a_grid_first(rng, tmp_path):
+    grid = rng.uniform(2.0, 9.0) * np.array([[col, row] for row in range(2) for col in range(4)])
+    path = 0.1 * rng.uniform(0.5, 3.0) * np.arange(200)[:, None, None] * np.array([1.0, rng.uniform(0.1, 1.0)])
+    np.save(tmp_path / "a.npy", (grid + path).swapaxes(0, 1))
+    return tmp_path / "a.npy", {"fps": 10.0, "unit": "m"}, "individuals first? Exchange the axes"
+
+
 @kind
 def array_of_more_individuals_than_frames(rng, tmp_path):
     truth = Truth(rng, count=int(rng.integers(100, 200)))

@@ -45,10 +45,12 @@ def read_array(
             'names, such as {"t": a[:, 0], "x": a[:, 1], "y": a[:, 2]}',
             "axes",
         )
-    if _roughness(values, 1) < 0.5 and (_roughness(values, 0) > 1.0 or len(values) < 3):
+    # Individuals on a grid are as even as frames; but frames outnumber them, and lie nearer to each other.
+    grid = len(values) < values.shape[1] and _step(values, 0) > 5.0 * _step(values, 1)
+    if _roughness(values, 1) < 0.5 and (_roughness(values, 0) > 1.0 or len(values) < 3 or grid):
         findings.add_error(
             f"{where}: {values.shape} are {len(values)} frames of {values.shape[1]} individuals, row 1 on, but places "
-            "go smoothly along the second axis, and not along the first: individuals first? Exchange the axes: "
+            "go more smoothly along the second axis than along the first: individuals first? Exchange the axes: "
             "python -c \"import numpy as np; np.save('frames.npy', ARRAY.swapaxes(0, 1))\"",
             "axes",
         )
@@ -68,6 +70,12 @@ def read_array(
         name = names[number] if names else str(number + 1)
         found.append(ImportedTrack(name, where, frames / rate, columns, frames))
     return found
+
+
+def _step(values: Any, axis: int) -> float:
+    """Return the median step along an axis; 0 where there is none."""
+    step = np.abs(np.diff(values.astype(float), axis=axis))
+    return float(np.median(step[np.isfinite(step)])) if np.isfinite(step).any() else 0.0
 
 
 def _roughness(values: Any, axis: int) -> float:
