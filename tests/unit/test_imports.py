@@ -372,9 +372,9 @@ def test_a_unit_of_time_that_is_wrong_is_told_without_a_velocity(tmp_path):
     )
     assert airflock.load_tracks(path, map={"t": "'t [ms]'*1e-06"}).attrs["fps"] == RATE
     slow = own.assign(t=own["t"] * 1e6 / RATE)
-    assert "if times are no seconds, for instance --time-unit us" in refused(slow)
+    assert "if times are no seconds, for instance --time-unit ms or us" in refused(slow)
     assert (
-        "if it does not count seconds, write for instance --time-unit us"
+        "if it does not count seconds, write for instance --time-unit ms or us"
         in (airflock.load_tracks(slow, unit="m").attrs["airflock_import"])
     )
     dates = own.assign(t=1.7e12 + own["t"] * 1e6).rename(columns={"t": "t [ms]"})  # a fix a minute, since 1970

@@ -96,6 +96,90 @@ def test_degrees_times_1e7_are_read_as_the_fault_says_to_write(tmp_path):
     assert float(abs(found["position"]).max()) < 100.0
 
 
+def test_heights_beside_degrees_times_1e7_are_millimetres_as_the_error_says_to_write(tmp_path):
+    degrees = [[t, round(475e6 + 100 * t), 190400000, round(120e3 + 500 * t)] for t in TIMES]
+    text = "time_boot_s,lat,lon,alt\n" + rows(degrees)
+    assert '--map "lon:=lon*1e-7" --map "alt:=alt*1e-3"' in refused(tmp_path, text)
+    ways = {"lat": "lat*1e-7", "lon": "lon*1e-7", "alt": "alt*1e-3"}
+    height = tracks(tmp_path, text, map=ways)["position"].sel(space="z")
+    assert float(np.ptp(height.values)) == pytest.approx(0.5 * TIMES[-1], abs=1e-3)
+
+
+def test_advice_on_degrees_goes_by_their_size(tmp_path):
+    exchanged = "t,lat,lon\n" + rows([[t, 151.2, -33.9 + 1e-5 * t] for t in TIMES])
+    assert refused(tmp_path, exchanged).endswith('write --map "lat:=lon" --map "lon:=lat"')
+    found = tracks(tmp_path, exchanged, map={"lat": "lon", "lon": "lat"})
+    assert float(np.ptp(found["position"].sel(space="y").values)) == pytest.approx(1.109 * TIMES[-1], rel=1e-2)
+    minutes = "t,lat,lon\n" + rows([[t, 4730.1 + 1e-3 * t, 1902.5] for t in TIMES])
+    assert "degrees and minutes" in refused(tmp_path, minutes)
+    assert "1e-7" not in refused(tmp_path, minutes)
+
+
+@pytest.mark.parametrize(("unit", "seconds", "step"), [("days", 86400, 4), ("days", 86400, 1), ("hours", 3600, 4)])
+def test_times_that_make_birds_faster_than_aircraft_are_no_seconds(tmp_path, unit, seconds, step):
+    moments = TIMES * step
+    text = "time,lat,lon\n" + rows([[f"{45444 + t / seconds:.10f}", 47 + 1e-4 * t, 19] for t in moments])
+    line = refused(tmp_path, text)
+    assert "column time" in line and "row 2" in line and unit in line and "time*86400" in line
+    found = tracks(tmp_path, text, map={"t": f"time*{seconds}"})
+    assert float(found["velocity"].sel(space="y").median()) == pytest.approx(11.1, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["datetime,particle,x,y", "Date Time,particle,easting,northing", "t,id,Easting [m],Northing [m]"],
+)
+def test_common_names_of_columns_are_known(tmp_path, header):
+    found = tracks(tmp_path, header + "\n" + long())
+    np.testing.assert_allclose(found["position"].values[:, :, 0, 1], np.stack(place(TIMES, 2), axis=1))
+
+
+def test_latitudes_of_satellites_are_known_by_their_name(tmp_path):
+    text = "time,GPS Lat,GPS Lon,GPS Alt\n" + rows([[t, 47 + 1e-5 * t, 19, 100] for t in TIMES])
+    north = tracks(tmp_path, text)["position"].sel(space="y").values
+    assert float(np.ptp(north)) == pytest.approx(1.112 * TIMES[-1], rel=1e-2)
+
+
+def test_one_place_on_a_body_with_a_score_is_that_of_the_individual(tmp_path):
+    text = "t,thorax.x,thorax.y,thorax.score\n" + rows([[t, *place(t, 1), 0.9] for t in TIMES])
+    found = tracks(tmp_path, text, unit="m")
+    np.testing.assert_allclose(found["position"].values[:, :, 0, 0], np.stack(place(TIMES, 1), axis=1))
+    off = [[t, *(place(t, 1) if t != 5.0 else (90.0, 90.0)), 0.9 if t != 5.0 else 0.1] for t in TIMES]
+    notes = []
+    tracks(tmp_path, "t,nose_x,nose_y,nose_likelihood\n" + rows(off), unit="m", say=notes.append)
+    assert any("1 rows less likely than 0.6" in note for note in notes)
+
+
+def test_clocks_since_switching_on_are_named_where_nobody_is_there_for_long(tmp_path):
+    cells = [[f"{t + 500 * n}", n, *place(t, n), 1.7e9 + t] for t in TIMES for n in (1, 2, 3)]
+    text = "t,id,x,y,server\n" + rows(cells)
+    assert "--map utc:=COLUMN" in refused(tmp_path, text, unit="m")
+    assert tracks(tmp_path, text, unit="m", map={"utc": "server"}).sizes["time"] == len(TIMES)
+
+
+def test_places_that_are_there_but_not_read_are_named(tmp_path):
+    notes = []
+    deep = "t,x,y,depth [m]\n" + rows([[t, *place(t, 1), 3 + 0.1 * t] for t in TIMES])
+    tracks(tmp_path, deep, unit="m", say=notes.append)
+    assert """column depth [m] is left out; for a height, write --map "z:=-'depth [m]'\"""" in " ".join(notes)
+    found = tracks(tmp_path, deep, unit="m", map={"z": "-'depth [m]'"}, accept="down")
+    assert float(found["velocity"].sel(space="z").mean()) == pytest.approx(-0.1, rel=1e-3)
+    twice = "t,lat,lon,x,y\n" + rows([[t, 47 + 1e-5 * t, 19, 50 * t, 0] for t in TIMES])
+    tracks(tmp_path, twice, unit="m", say=notes.append)
+    assert '--map "lat:=lat" --map "lon:=lon"' in notes[-1] + " ".join(notes)
+    found = tracks(tmp_path, twice, map={"lat": "lat", "lon": "lon"})
+    assert float(found["velocity"].sel(space="y").mean()) == pytest.approx(1.112, rel=1e-2)
+
+
+def test_hours_between_dates_of_two_files_ask_for_their_zones(tmp_path):
+    for name, hour in (("a", "08"), ("b", "10")):
+        text = "timestamp,x,y\n" + rows([[f"2024-06-01T{hour}:{clock(t)[3:]}", *place(t, 1)] for t in TIMES])
+        (tmp_path / f"{name}.csv").write_text(text)
+    with pytest.raises(RecordingError) as error:
+        airflock.load_tracks([tmp_path / "a.csv", tmp_path / "b.csv"], unit="m")
+    assert "are of different zones" in str(error.value)
+
+
 def test_nothing_is_said_of_satellite_time_where_there_is_none(tmp_path):
     notes = []
     tracks(tmp_path, WRITTEN["wide, number last"][0], say=notes.append)

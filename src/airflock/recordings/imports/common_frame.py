@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.recordings.imports.table_columns import quote_column
+from airflock.recordings.imports.table_columns import quote_column, split_header
 from airflock.recordings.imports.track import (
     COMMAND_TARGETS,
     GEODETIC_TARGETS,
@@ -116,10 +116,20 @@ def _degrees_error(track: ImportedTrack) -> str:
     if not bad.size:
         return ""
     names = [name for name in DEGREES if beyond[name].any()]
-    ways = " ".join(f'--map "{name}:={quote_column(track.label(name))}*1e-7"' for name in names)
+    own = {name: quote_column(track.label(name)) for name in track.columns}
+    ways = " ".join(f'--map "{name}:={own[name]}*1e-7"' for name in names)
+    most = max(abs(lat[bad[0]]), abs(lon[bad[0]]))
+    if most <= DEGREES["lon"]:
+        remedy = f'if they are exchanged, write --map "lat:={own["lon"]}" --map "lon:={own["lat"]}"'
+    elif most <= 100.0 * DEGREES["lon"]:  # ddmm.mmm of NMEA 0183: an expression cannot part it
+        remedy = "if it is degrees and minutes, ddmm.mmm, write degrees (dd + mm.mmm / 60) into the file"
+    else:
+        # Who sends 1e-7 degrees sends millimetres; source: MAVLink, GLOBAL_POSITION_INT.
+        ways += f' --map "alt:={own["alt"]}*1e-3"' if not split_header(track.label("alt"))[1] and "alt" in own else ""
+        remedy = f"if it is in 1e-7 degrees, write {ways}"
     return (
         f"{track.source}: column {', '.join(map(track.label, names))}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, "
-        f"{lon[bad[0]]:g} is no latitude and longitude; if it is in 1e-7 degrees, write {ways}"
+        f"{lon[bad[0]]:g} is no latitude and longitude; {remedy}"
     )
 
 

@@ -230,6 +230,7 @@ def read_tracks(
         track_checks.note_resolution(track, findings)
     findings.raise_errors()
     for own in track_checks.tracks_by_source(tracks).values():
+        _question_speeds(own, findings)
         _question_lengths(own, findings)
     findings.raise_errors()
     return tracks, comparable
@@ -286,13 +287,37 @@ def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
         track.keep(~bad)
 
 
+def _question_speeds(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Ask for the unit of times where no velocity is logged and rows go faster than anything that flies."""
+    rates = [_speeds(track, slice(0, 10_000)) for track in tracks if not track.has(VELOCITY_TARGETS)]
+    usual = float(np.median(rate)) if len(rate := np.concatenate(rates or [np.empty(0)])) else 0.0
+    first = tracks[0]
+    if (
+        "t" in first.user_labels
+        and usual > (MAX_SPEED * 10.0 if first.unitless else MAX_SPEED)
+        and first.time[0] < SINCE_1970
+    ):
+        name = quote_column(first.label("t"))
+        findings.add_error(
+            f"{first.source}: column {first.label('t')}, row {first.rows[0]} on: rows move by {usual:.3g} m/s, faster "
+            f'than anything that flies: if times are days, as in spreadsheets, write --map "t:={name}*86400", if hours '
+            "*3600, if minutes *60; or name the unit of lengths",
+            "time",
+        )
+
+
+def _speeds(track: ImportedTrack, rows: slice) -> Any:
+    """Return how fast those rows move that move at all, m/s."""
+    place = track.stack(POSITION_TARGETS, 2)[rows]
+    speeds = np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(track.time[rows])
+    return speeds[speeds > 0.0]
+
+
 def _question_lengths(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Ask whether positions of a file without a unit are degrees, or smaller than metres."""
     some = [(track, slice(0, 10_000)) for track in tracks if track.unitless]
     places = [track.stack(POSITION_TARGETS, 2)[rows] for track, rows in some]
-    speeds = [np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(track.time[rows])
-              for place, (track, rows) in zip(places, some, strict=True)]  # fmt: skip
-    moving = np.concatenate([speed[speed > 0.0] for speed in speeds] or [np.empty(0)])
+    moving = np.concatenate([_speeds(track, rows) for track, rows in some] or [np.empty(0)])
     if len(moving) < 5:
         return
     usual, every, first = float(np.median(moving)), np.abs(np.concatenate(places)), tracks[0]
@@ -306,7 +331,7 @@ def _question_lengths(tracks: list[ImportedTrack], findings: ImportReport) -> No
         ways = f'--map "lon:={quote_column(lon)}" --map "lat:={quote_column(lat)}"'
         findings.add_error(
             f"{line}: degrees? Write {ways}; if they are metres, --unit m; if times are no seconds, for instance "
-            "--time-unit us"
+            "--time-unit ms or us"
         )
     elif usual > FASTEST:
         findings.add_error(f"{line}: cm or mm? Write --unit cm, or --unit mm; if they are metres, --unit m")
@@ -441,6 +466,7 @@ READERS: dict[str, tuple[str, Reader]] = {
 }
 
 SLOWEST, FASTEST = 2.5e-3, 100.0  # m/s: usual speeds beyond are no metres, where nobody has said so
+MAX_SPEED = 1000.0  # m/s of usual motion; faster than an aircraft of any kind whose flock could be scored
 SINCE_1970 = 1e8  # s; times beyond count since 1970
 AUTOPILOT_SUFFIXES = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
 

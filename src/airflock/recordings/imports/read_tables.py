@@ -541,7 +541,7 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
             )
 
 
-KEYPOINT = re.compile(r"(.+)_([xyz])")
+KEYPOINT = re.compile(r"(.+)_([xyz]|score|likelihood|confidence)")
 
 # Wide tables: columns for each individual, as x1, y1, x2, y2 or fish1_x, fish1_y, fish2_x, fish2_y.
 AXIS_FIRST = re.compile(r"([xyz])_?(\d+)")
@@ -575,8 +575,11 @@ def keypoint_columns(names: list[str], stem: str, keypoint: str) -> PoseColumns:
         if match := KEYPOINT.fullmatch(text):
             found.setdefault(match[1], {})[match[2]] = name
     whole = {keypoint: parts for keypoint, parts in found.items() if {"x", "y"} <= set(parts)}
-    # One pair such as goal_x and goal_y holds no positions unless somebody says so.
-    return {stem: whole} if len(whole) > 1 or set(whole) == {keypoint} else {}
+    # One pair such as goal_x and goal_y holds no positions unless somebody says so, or a tracker gives it a score.
+    scored = any(len(set(parts) - {*POSITION_TARGETS}) for parts in whole.values())
+    for parts in whole.values():
+        parts.pop("score", None)  # of SLEAP, which is no likelihood
+    return {stem: whole} if len(whole) > 1 or scored or set(whole) == {keypoint} else {}
 
 
 def choose_keypoint(names: list[str], options: ImportOptions, where: str) -> str:

@@ -42,16 +42,19 @@ SPELLINGS = (  # of units, after the unit itself
 UNIT_WORDS = {word: line.split()[0] for line in SPELLINGS for word in line.split()[1:]}
 UNIT_HINT = "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # for a length without a unit
 
-_EAST, _NORTH, _UP = ("x", "e", "east"), ("y", "n", "north"), ("z", "u", "up")
+_EAST, _NORTH, _UP = ("x", "e", "east", "easting"), ("y", "n", "north", "northing"), ("z", "u", "up")
 ALIASES: dict[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "seconds"),
+    "t": ("t", "time", "timestamp", "seconds", "datetime", "date_time", "time_boot"),
     "frame": ("frame", "frames", "frame_idx", "frame_index", "frame_number"),
     "id": ("id", "individual", "agent", "drone", "track", "track_id", "trackid", "animal", "tag", "identity", "name",
            "individual_local_identifier", "tag_local_identifier", "fish", "bird", "ant", "subject", "uav", "vehicle",
-           "individual_id", "agent_id", "drone_id", "animal_id", "fish_id", "bird_id", "object_id", "vehicle_id"),
-    "lat": ("lat", "latitude", "location_lat"),
-    "lon": ("lon", "lng", "long", "longitude", "location_long", "location_lon"),
-    "alt": ("alt", "altitude", "height", "amsl", "height_above_msl", "height_above_ellipsoid", "relative_alt", "agl"),
+           "individual_id", "agent_id", "drone_id", "animal_id", "fish_id", "bird_id", "object_id", "vehicle_id",
+           "particle"),
+    "lat": ("lat", "latitude", "location_lat", "gps_lat", "gps_latitude"),
+    "lon": ("lon", "lng", "long", "longitude", "location_long", "location_lon", "gps_lon", "gps_lng", "gps_long",
+            "gps_longitude"),
+    "alt": ("alt", "altitude", "gps_alt", "gps_altitude", "height", "relative_alt", "agl",
+            "amsl", "height_above_msl", "height_above_ellipsoid"),
     "utc": ("utc", "utc_time", "unix", "unix_time", "gps_time", "time_utc", "timestamp_utc",
             "utc_timestamp", "unix_timestamp", "epoch"),
     "air": ("air", "in_air", "flying", "armed"),
@@ -72,7 +75,9 @@ for _axis, (_place, _speed, _wish, _words) in enumerate(
     ALIASES[_speed] = tuple(f"{p}{w}" for p in ("v", "v_", "vel_", "velocity_", "speed_") for w in _words)
     wishes = ("c", "c_", "cmd_", "cmd_v", "command_", "command_v", "target_v", "target_vel_", "set_v", "sp_v", "tv")
     ALIASES[_wish] = tuple(f"{p}{w}" for p in wishes for w in _words)
-EAST_HEADERS = frozenset(alias for alias in (*ALIASES["x"], "pe") if alias.split("_")[-1] in ("e", "east", "pe"))
+EAST_HEADERS = frozenset(
+    alias for alias in (*ALIASES["x"], "pe") if alias.split("_")[-1] in ("e", "east", "easting", "pe")
+)
 ALIASES |= {"x": (*ALIASES["x"], "pe"), "y": (*ALIASES["y"], "pn")}  # of ArduPilot's XKF1, beside PD, VN, VE, VD
 DOWN = {"down": "z", "pos_d": "z", "pos_down": "z", "position_down": "z", "vd": "vz", "vel_d": "vz", "vel_down": "vz",
         "pd": "z", "cmd_d": "cz", "cmd_vd": "cz", "cmd_down": "cz"}  # fmt: skip
@@ -417,6 +422,7 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
     _frames(found, options, errors)
     if whole:
         _complete(found, columns, errors)
+        _note_unread(found, columns, options)
     dates = [column for column in columns if split_header(column)[0] in DATE_WORDS and column not in found.times]
     found.date = dates[0] if dates else ""
     if errors:
@@ -557,6 +563,20 @@ def _complete(found: ColumnLayout, columns: Sequence[str], errors: list[str]) ->
             errors.append(
                 f"{found.where}: has {there} ({found.user_labels[there]}) but no {lacks}; --map {lacks}:=COLUMN"
             )
+
+
+def _note_unread(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
+    """Note places that are there but not read: a depth, and latitudes beside x and y."""
+    depth = next((column for column in columns if split_header(column)[0] == "depth"), "")
+    if depth and not {"z", "alt"} & set(found.expressions):
+        way = f'--map "z:=-{quote_column(depth)}"'
+        found.notes.append(f"{found.where}: column {depth} is left out; for a height, write {way}")
+    if {"lat", "lon", "x", "y"} <= set(found.expressions) and "x" not in options.map:
+        x, y, lat, lon = (found.user_labels[name] for name in ("x", "y", "lat", "lon"))
+        found.notes.append(
+            f"{found.where}: {x}, {y} are read as positions; also there: {lat}, {lon}; for these write "
+            f'--map "lat:={quote_column(lat)}" --map "lon:={quote_column(lon)}"'
+        )
 
 
 def _ned(found: ColumnLayout, options: ImportOptions) -> None:

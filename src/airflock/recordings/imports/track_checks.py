@@ -251,9 +251,8 @@ def _wrong_step(track: ImportedTrack) -> str:
     step, name = median_period(track), track.label("t")
     where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
     if step and not STEPS[0] <= step <= STEPS[1]:
-        return (
-            f'{where}; the unit is another one: write --map "t:={quote_column(name)}*1e-6" (for us) or *1e-3 (for ms)'
-        )
+        ways = '*1e-6" (for us) or *1e-3 (for ms)' if step > STEPS[1] else '*86400" (for days) or *3600 (for hours)'
+        return f'{where}; the unit is another one: write --map "t:={quote_column(name)}{ways}'
     unit, finer = split_header(name)[1], {"ms": ("us", 1e-6), "us": ("ns", 1e-9), "µs": ("ns", 1e-9)}
     if unit in finer and step >= SLOW and track.time[0] < SINCE_1970 and not track.has(VELOCITY_TARGETS):
         other, factor = finer[unit]
@@ -274,7 +273,7 @@ def _unsaid_step(track: ImportedTrack) -> str:
         return ""
     return (
         f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart; if it does not count seconds, "
-        "write for instance --time-unit us"
+        "write for instance --time-unit ms or us"
     )
 
 
@@ -428,9 +427,13 @@ def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
             continue
         track, share = own[rare[0]], shares[rare[0]]
         more = f", {len(rare) - 1} more for less than {LEAST:.0%}" if len(rare) > 1 else ""
+        clock = "; or --map utc:=COLUMN if each counts since it was switched on" if len(rare) == len(own) > 1 else ""
+        if first > SINCE_1970 and len(tracks) > 1:
+            clock = "; or if their times are of different zones, write these behind them, as 2026-05-04T10:00:00+02:00"
         findings.add_error(
             f"{source}: {track.name} is there for {share:.0%} of {last - first:.4g} s "
-            f"(from {track.time[0]:.4g} to {track.time[-1]:.4g} s){more}; leave it out, or cut with --begin and --end",
+            f"(from {track.time[0]:.4g} to {track.time[-1]:.4g} s){more}; leave it out, or cut with --begin and --end"
+            f"{clock}",
             "absent",
         )
 
