@@ -180,6 +180,28 @@ def test_hours_between_dates_of_two_files_ask_for_their_zones(tmp_path):
     assert "are of different zones" in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("column", "first", "later", "left_out"),
+    [("status", "invalid", "valid", 6), ("fix", "nofix", "3d", 6), ("fix", range(6), range(6, 40), 0)],
+)
+def test_a_column_of_fixes_is_read_by_its_words_and_not_if_it_counts_them(tmp_path, column, first, later, left_out):
+    words = [*([first] * 6 if isinstance(first, str) else first), *([later] * 34 if isinstance(later, str) else later)]
+    text = f"t,lat,lon,{column}\n" + rows([[t, 47 + 1e-5 * t, 19, word] for t, word in zip(TIMES, words, strict=True)])
+    notes = []
+    assert tracks(tmp_path, text, say=notes.append).sizes["time"] == len(TIMES) - left_out
+    assert any(f"column {column}" in note for note in notes)
+
+
+@pytest.mark.parametrize("apart", [5.0, 20.0, 35.0])
+def test_identities_exchanged_in_even_motion_are_a_jump(tmp_path, apart):
+    """Positions of simulations have no noise; a step of 2 m a row is none either."""
+    cells = [[t, n, 4.0 * t, apart * (n if t < 9.0 else 1 - n)] for t in TIMES for n in (0, 1)]
+    with pytest.raises(RecordingError, match="identities exchanged"):
+        tracks(tmp_path, "t,id,x,y\n" + rows(cells), unit="m")
+    found = tracks(tmp_path, "t,id,x,y\n" + rows(cells), unit="m", accept="jumps")
+    assert float(abs(found["velocity"]).max()) == pytest.approx(4.0)
+
+
 def test_nothing_is_said_of_satellite_time_where_there_is_none(tmp_path):
     notes = []
     tracks(tmp_path, WRITTEN["wide, number last"][0], say=notes.append)

@@ -269,7 +269,8 @@ def _no_number(text: str, time: bool) -> str:
 
 # Words of columns that say which rows count: of Movebank and pandas, and of NMEA (A: active, V: void).
 FLAG_WORDS = {"true": 1, "t": 1, "yes": 1, "a": 1, "false": 0, "f": 0, "no": 0, "v": 0,
-              "none": 0, "no fix": 0, "no_fix": 0, "2d": 2, "3d": 3}  # fmt: skip
+              "none": 0, "no fix": 0, "no_fix": 0, "nofix": 0, "2d": 2, "3d": 3,
+              "invalid": 0, "valid": 1, "ok": 1}  # fmt: skip
 
 
 def _flag_values(column: Any) -> Any:

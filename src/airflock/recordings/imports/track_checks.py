@@ -66,8 +66,10 @@ def _reject(source: str, column: str, own: list[ImportedTrack], counts: list[Any
     values = [track.flags[column][1] for track in own]
     known = np.concatenate(values)
     known = known[np.isfinite(known)]
-    if flag.least == 0.6 and len(known) and not (known.min() >= 0.0 and known.max() <= 1.0):
-        findings.notes.append(f"{where}: lies outside 0 to 1, row {own[0].rows[0]} on: not read as a likelihood")
+    # Types of fixes end at 8 in MAVLink and NMEA: more are a number of the fix.
+    most, name = {0.6: (1.0, "likelihood"), 2.0: (8.0, "type of fix")}.get(flag.least, (np.inf, ""))
+    if name and len(known) and not (known.min() >= 0.0 and known.max() <= most):
+        findings.notes.append(f"{where}: lies outside 0 to {most:g}, row {own[0].rows[0]} on: not read as a {name}")
         return
     # A column `fix` of 0 and 1 says yes or no, and counts no dimensions.
     least = min(flag.least, max(1.0, known.max(initial=0.0))) if flag.least == 2.0 else flag.least
@@ -842,6 +844,8 @@ def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
         return np.zeros_like(error), np.ones(len(error))
     # of the livelier axis: who flies along one rests in the other
     scale = 1.4826 * float(np.median(np.abs(noise[moving]), axis=0).max())
-    quantum = float(np.abs(moved[moved != 0.0]).min())  # of positions that come in steps
+    quantum = float(np.abs(moved[moved != 0.0]).min())  # of positions that come in steps, and repeat between them
+    if not track.has(VELOCITY_TARGETS) and moved.any(axis=1).mean() > 0.9:
+        quantum = 0.0  # even motion, whose steps are no noise
     scale = max(scale, quantum, 0.1 * float(np.median(np.abs(moved[moving]), axis=0).max()), 1e-9)
     return error, (SIGMAS if track.has(VELOCITY_TARGETS) else WILD) * scale * np.maximum(steps / step, 1.0)
