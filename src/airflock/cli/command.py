@@ -28,8 +28,7 @@ def expand_home(word: str) -> str:
 def usage_error(error: Any, words: Sequence[str]) -> str:
     """Return one line for an error of typer; `words` are those of the command line.
 
-    Typer's error classes have moved between its versions, so they are recognised by their
-    attributes.
+    Typer's error classes have moved between its versions, so they are recognised by their attributes.
     """
     context = getattr(error, "ctx", None)
     verb = _command_path(context).partition(" ")[2]
@@ -168,8 +167,8 @@ NUMBER_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")
 class VerbCommand(TyperCommand):
     """Command that checks its options one by one; nan and inf are refused where an option has a range.
 
-    A verb that takes its context goes on with numbers that are `WRONG`, and refuses them with all
-    else that it finds wrong (`options.collect_option_errors`); any other ends before it begins.
+    A verb that takes its context goes on with numbers that are `WRONG`, and refuses them with all else that it finds
+    wrong (`options.collect_option_errors`); any other ends before it begins.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

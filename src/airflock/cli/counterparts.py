@@ -10,8 +10,7 @@ from typing import NamedTuple
 class PythonCounterpart(NamedTuple):
     """Counterpart of one command: the call in Python, the function, and option → argument (or a replacement).
 
-    A function without a dot is a public name of `airflock`; the others, with their module, take
-    more preparation.
+    A function without a dot is a public name of `airflock`; the others, with their module, take more preparation.
     """
 
     call: str

@@ -95,14 +95,12 @@ def fleet(
 ) -> None:
     """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step or on the real clock.
 
-    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 10 --duration 60 --seeds 5 --against
-    simulator
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 10 --duration 60 --seeds 5 --against simulator
 
-    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 60 --mode processes
-    --vehicle ardupilot
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 60 --mode processes --vehicle ardupilot
 
-    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes
-    --card fleet.json, and beside it airflock watch fleet.json
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
+    and beside it airflock watch fleet.json
     """
     from airflock.fleets import SECONDS_BEFORE_START, compare, flying
 
@@ -290,8 +288,7 @@ def prepare(
 
     Card and mission.key go to every drone; mission.operator stays with the operator.
 
-    Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10
-    --out mission.json
+    Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10 --out mission.json
     """
     import secrets
 

@@ -96,12 +96,10 @@ def import_tracks(
 ) -> None:
     r"""Turn flight logs and animal tracks into a recording that every other verb takes.
 
-    Columns are recognised by their headers (x \[mm], time_us, vel_e, location-lat, ...), or mapped.
-    Positions, signs, units, clocks, duplicates, jumps and gaps are checked; each fault is one line,
-    which says what to write instead.
+    Columns are recognised by their headers (x \[mm], time_us, vel_e, location-lat, ...), or mapped. Positions, signs,
+    units, clocks, duplicates, jumps and gaps are checked; each fault is one line, which says what to write instead.
 
-    Example: airflock import drone*.csv --map t:=time_us*1e-6 --map x:=pos_e --map y:=pos_n --map
-    id:=file --same-clock
+    Example: airflock import drone*.csv --map t:=time_us*1e-6 --map x:=pos_e --map y:=pos_n --map id:=file --same-clock
     """
     from airflock.recordings import load_tracks, save as save_recording
 
@@ -236,11 +234,9 @@ def identify(
 ) -> None:
     """Find the lag, limits, noise, sensor error and radio of a fleet in its own logs, with 95 % intervals.
 
-    What the logs cannot show is listed with the reason, and stays as in --like. Logs need commands
-    and raw velocities.
+    What the logs cannot show is listed with the reason, and stays as in --like. Logs need commands and raw velocities.
 
-    Example: airflock identify logs/*.ulg --heard heard.csv --like vasarhelyi_2018/real_6ms --out
-    mine.toml
+    Example: airflock identify logs/*.ulg --heard heard.csv --like vasarhelyi_2018/real_6ms --out mine.toml
     """
     from airflock.estimate import identify as find, read_heard
     from airflock.recordings import ImportOptions
@@ -446,12 +442,10 @@ def infer(
 ) -> None:
     """Find which flocking law explains tracks best, with which numbers, and what it leaves unexplained.
 
-    Each law is fitted by the likelihood of the next frame and judged on data that it has not seen:
-    neighbouring spans of one recording, or whole recordings where there are several. --set gives
-    what is known of the place, for all laws.
+    Each law is fitted by the likelihood of the next frame and judged on data that it has not seen: neighbouring spans
+    of one recording, or whole recordings where there are several. --set gives what is known of the place, for all laws.
 
-    Example: airflock infer fish.nc --models couzin_2002,reynolds_1987,vicsek_1995 --out best.toml
-    --plot forces.png
+    Example: airflock infer fish.nc --models couzin_2002,reynolds_1987,vicsek_1995 --out best.toml --plot forces.png
     """
     from airflock.estimate import infer as find
 

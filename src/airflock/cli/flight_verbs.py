@@ -152,8 +152,7 @@ def score(
 ) -> None:
     """Measure recordings, simulated or flown, with the same order parameters.
 
-    Tracks have no scenario: what depends on a length (collisions, clusters) is shown only if you
-    give it.
+    Tracks have no scenario: what depends on a length (collisions, clusters) is shown only if you give it.
 
     Example: airflock score fish.nc --body-length 0.04 --series course.csv
     """
@@ -326,8 +325,7 @@ def sweep(
 ) -> None:
     """Fly a scenario over a grid of values and tabulate the order parameters.
 
-    Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over
-    radio.range=80,160,320 --plot map.png
+    Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
     from airflock.recordings import fly_points, grid_points, metric_to_show, scenarios_at
 
@@ -482,8 +480,8 @@ def plot(
 ) -> None:
     """Draw trajectories coloured by speed, order parameters over time, or a model's rules.
 
-    In a city, forest or mesh: paths through the scene from above or in space, one agent's rays,
-    share flocked. Also the time since the last packet by distance: --kind reception.
+    In a city, forest or mesh: paths through the scene from above or in space, one agent's rays, share flocked. Also
+    the time since the last packet by distance: --kind reception.
 
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
@@ -531,8 +529,7 @@ def video(
 ) -> None:
     r"""Make an MP4 or GIF of a flight. Needs pip install 'airflock\[video]'.
 
-    Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out
-    flight.mp4
+    Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
     options.check_writable((out, VIDEOS))
     from airflock.recordings import time_series_names
@@ -715,9 +712,8 @@ def watch(
 ) -> None:
     """Open a page that flies a scenario live: play it, turn its sliders, select agents, save what you found.
 
-    With --against, two laws or sets of parameters fly side by side. Given a flight card, the page
-    shows its fleet, in software or in the air, from the packets that a radio receives; it sends
-    nothing.
+    With --against, two laws or sets of parameters fly side by side. Given a flight card, the page shows its fleet, in
+    software or in the air, from the packets that a radio receives; it sends nothing.
 
     Example: airflock watch vasarhelyi_2018/4ms --agents 50 --against radio.delay=3
 

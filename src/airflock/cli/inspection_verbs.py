@@ -70,8 +70,7 @@ def validate(
 ) -> None:
     """Check scenario and study files (every error at once), or fly a recording again and compare the bits.
 
-    With --json, each file has a verdict (null if it is wrong), its faults and its notes. Exit
-    status 2 if any is wrong.
+    With --json, each file has a verdict (null if it is wrong), its faults and its notes. Exit status 2 if any is wrong.
 
     Example: airflock validate mine.toml
     """

@@ -170,8 +170,7 @@ def _on_sigterm(number: int, _: Any) -> NoReturn:
 def _repeat_interrupt(lost: Any) -> None:
     """Repeat an interruption that fell into a finaliser, where Python can only print it, a moment later.
 
-    Numba's compiler drops objects with finalisers at every turn: Ctrl-C and SIGTERM were lost in
-    one of 200 tries.
+    Numba's compiler drops objects with finalisers at every turn: Ctrl-C and SIGTERM were lost in one of 200 tries.
     """
     if not (lost.exc_type and issubclass(lost.exc_type, KeyboardInterrupt)):
         sys.__unraisablehook__(lost)

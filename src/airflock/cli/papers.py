@@ -101,10 +101,9 @@ def paper_verb(
 
     Needs airflock-papers; in a clone of the repository: pip install -e ./papers
 
-    `all --quick` flies the small form of every paper, and fails if a verdict differs from the one
-    committed for this kind of processor. `all --breaks` makes the change of every claim, and fails
-    if a claim still holds under its change, or does not hold without it, unless it was seen to turn
-    red on another kind of processor.
+    `all --quick` flies the small form of every paper, and fails if a verdict differs from the one committed for this
+    kind of processor. `all --breaks` makes the change of every claim, and fails if a claim still holds under its
+    change, or does not hold without it, unless it was seen to turn red on another kind of processor.
 
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """

@@ -213,9 +213,8 @@ def harden(
 ) -> None:
     """Make an optimum safer: try the steps of Table S4, and keep those that help, cost little and break nothing.
 
-    A step towards a limit that is not kept yet may cost more. With a study of several scenarios, a
-    step must keep what held in each; further files end in _2 and so on. Exit status 1 if no step
-    was kept.
+    A step towards a limit that is not kept yet may cost more. With a study of several scenarios, a step must keep what
+    held in each; further files end in _2 and so on. Exit status 1 if no step was kept.
 
     Example: airflock harden study --out flyable.toml
     """
@@ -338,11 +337,10 @@ def tune(
 ) -> None:
     """Start, evolve, harden, certify, report: tuned.toml to fly, certificate.toml, and report.html to sign.
 
-    Numbers of the law that the file leaves out are scaled to its speed. Exit status 1 if a limit is
-    not shown.
+    Numbers of the law that the file leaves out are scaled to its speed. Exit status 1 if a limit is not shown.
 
-    From logs, the numbers of the drones are identified first. For more options, run airflock
-    identify and tune the file that it writes.
+    From logs, the numbers of the drones are identified first. For more options, run airflock identify and tune the
+    file that it writes.
 
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
@@ -625,8 +623,7 @@ def certify(
 
     Exit status 0: every limit is shown to hold (or the check passes); 1: not; 2: bad input.
 
-    Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min
-    --out certificate.toml
+    Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
     """
     errors = options.collect_option_errors(ctx)
     if check:

@@ -16,8 +16,7 @@ from typing import Any, Protocol
 def column_statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return mean, standard deviation and median of each column; of a column of lists, those of each place.
 
-    A value that is nan (a time of what never happened) is left out; where all are, the statistics
-    are nan.
+    A value that is nan (a time of what never happened) is left out; where all are, the statistics are nan.
     """
     summary: dict[str, dict[str, Any]] = {"mean": {}, "std": {}, "median": {}}
     for key, first in rows[0].items():
@@ -58,8 +57,7 @@ def print_score_table(
 ) -> None:
     """Print order parameters beside what a paper reports; about: unit and meaning by name.
 
-    What no flight has (a clearance where nothing stands) is named in one line below instead of a
-    number.
+    What no flight has (a clearance where nothing stands) is named in one line below instead of a number.
     """
     from rich import box
     from rich.console import Console
@@ -199,8 +197,8 @@ class LogProgress:
 class TimeLeft:
     """Rate of the work: `left` is the remaining time (s), None while unknown.
 
-    What was done before it was first looked at, by a run that was cut off, took no time. Less done
-    than before means that other work begins.
+    What was done before it was first looked at, by a run that was cut off, took no time. Less done than before
+    means that other work begins.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
