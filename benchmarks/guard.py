@@ -77,7 +77,8 @@ class Version:
         """Start the process."""
         path = os.pathsep.join([str(tree / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
         paths = os.environ | {"PYTHONPATH": path, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, str(Path(__file__).resolve()), "--child"]
+        # Each tree flies by its own copy of this file, which knows how its modules are called.
+        command = [sys.executable, str(tree / "benchmarks" / "guard.py"), "--child"]
         self.process = subprocess.Popen(
             command, env=paths, cwd=tree, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
