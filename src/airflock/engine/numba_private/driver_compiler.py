@@ -6,6 +6,7 @@ and all three once more in every caller. Here the others stay what their callers
 code of LLVM.
 """
 
+from collections.abc import Hashable
 from typing import Any
 
 from numba import types
@@ -126,6 +127,10 @@ class _SharedTypes:
     knows how long a loop is. Functions that stand once in a driver are there for all lengths.
     """
 
+    # Signatures of operators and of functions of Numba's: it searches all forms for every statement.
+    # Without this memory the first flight in a city takes a fifth longer.
+    _known: dict[Hashable, Any] = {}
+
     def __init__(self, context: Any):
         self._context = context
 
@@ -139,7 +144,15 @@ class _SharedTypes:
             arguments = tuple(
                 types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one for one in arguments
             )
-        return self._context.resolve_function_type(function, arguments, named)
+        if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
+            return self._context.resolve_function_type(function, arguments, named)
+        key = self._context, function, arguments
+        if key not in self._known:
+            signature = self._context.resolve_function_type(function, arguments, named)
+            if signature is None:
+                return None
+            self._known[key] = signature
+        return self._known[key]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
