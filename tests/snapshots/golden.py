@@ -1,7 +1,8 @@
 """Short flights of every preset, compiled as for a Haswell: bits of all order parameters and of the recording.
 
-A process of its own flies, in which neither drivers nor NumPy use AVX-512, so that every processor with AVX2 and FMA
-gives these bits. Functions such as sin come from the C library: another one may round them differently.
+A process of its own flies, in which neither drivers nor NumPy use AVX-512, so that the record does not depend on the
+width of vectors. It still belongs to one machine: on another kind of processor 427 values differ, of the very text that
+was recorded, as functions such as sin come from the C library. There, compare with what the earlier text gives.
 """
 
 import json

@@ -2,8 +2,8 @@
 
 The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of
 the compiler, our own passes of it and the processor. What runs is always the text that was
-generated, never a file's; compiled code is loaded only under a seal (`numba_private.sealed_cache`),
-from a folder that belongs to the user alone (`airflock.support.cache`).
+generated, never a file's; compiled code is loaded only under a seal (`numba_private.sealed_cache`;
+plain Numba has none), from a folder that belongs to the user alone (`airflock.support.cache`).
 """
 
 import hashlib

@@ -22,7 +22,6 @@ SOFTWARE_SITE = (47.5, 19.0, 120.0)  # somewhere; a fleet in software is nowhere
 NEVER_EXPIRES = 2**39
 NUDGE_DISTANCE = 0.01  # m; what a packet resolves
 NUDGE_COUNT = 8
-POSITION_NAMES = ("x", "y", "z")
 
 
 def software_card(
