@@ -1,7 +1,10 @@
 """Files about the package agree with pyproject.toml: the conda recipe, the citation, the table of extras."""
 
+import importlib.util
+import json
 import re
 import tomllib
+from hashlib import sha256
 from pathlib import Path
 
 import airflock
@@ -9,6 +12,18 @@ from airflock.scenarios.named_code import MODELS
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def _script(path):
+    """Return a script of the repository as a module."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+fill_recipe = _script(ROOT / "tools" / "fill_recipe.py").fill_recipe
+wheel = _script(ROOT / "tests" / "nightly" / "wheel.py")
 CONDA_NAMES = {"matplotlib": "matplotlib-base"}  # the part without a window system
 
 
@@ -22,6 +37,30 @@ def test_the_conda_recipe_needs_what_pip_installs():
     assert sorted(needs) == sorted(wanted)
     for name in ("meta.yaml", "papers/meta.yaml"):
         assert f'version = "{airflock.__version__}"' in (ROOT / "conda" / name).read_text(encoding="utf-8")
+
+
+def test_a_filled_recipe_has_the_version_and_the_hash_of_its_sdist(tmp_path):
+    sdist = tmp_path / "airflock-9.8.7.tar.gz"
+    sdist.write_bytes(b"any bytes")
+    for name in ("meta.yaml", "papers/meta.yaml"):
+        filled = fill_recipe((ROOT / "conda" / name).read_text(encoding="utf-8"), sdist)
+        assert 'set version = "9.8.7"' in filled and f'sha256: "{sha256(b"any bytes").hexdigest()}"' in filled
+
+
+def test_the_deposit_has_title_and_licence_of_the_citation():
+    deposit = json.loads((ROOT / ".zenodo.json").read_text(encoding="utf-8"))
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f'title: "{deposit["title"]}"' in citation and f"license: {deposit['license']}\n" in citation
+    assert deposit["keywords"] == PROJECT["keywords"]
+
+
+def test_the_wheel_check_runs_each_command_of_the_readme():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert wheel.readme_commands() == [
+        "airflock run vasarhelyi_2018/4ms --plot flight.png",
+        "airflock watch vasarhelyi_2018/obstacles --agents 30",
+    ]
+    assert all(command in readme for command in wheel.readme_commands())
 
 
 def test_the_citation_names_this_version_and_the_publication_of_every_law():
