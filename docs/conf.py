@@ -17,7 +17,7 @@ extensions = [
     "myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery",
     "docstrings", "mathml", "pages", "terms",
 ]  # fmt: skip
-exclude_patterns = ["_build", "_ext", "evolve.md", "equations", "decisions", "gallery", "notebooks", "tours"]
+exclude_patterns = ["_build", "_ext", "evolve.md", "decisions", "gallery", "notebooks", "tours"]
 exclude_patterns += ["generated/**/*.ipynb", "**/*.codeobj.json"]
 suppress_warnings = ["config.cache"]  # the gallery's order is a function, which is no text to compare builds by
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]

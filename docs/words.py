@@ -35,8 +35,9 @@ def pages() -> list[Path]:
     """Return the texts written by hand: pages, and examples with their comments."""
     scripts = [path for folder in ("gallery", "notebooks", "tours") for path in sorted((DOCS / folder).glob("*.py"))]
     beside = [DOCS.parent / name for name in BESIDE if (DOCS.parent / name).is_file()]
-    own = [path for folder in (".", "equations", "decisions") for path in sorted((DOCS / folder).glob("*.md"))]
-    return [*own, *scripts, *beside]
+    own = [path for folder in (".", "decisions") for path in sorted((DOCS / folder).glob("*.md"))]
+    laws = sorted((DOCS.parent / "src" / "airflock" / "parts" / "laws").glob("*/*.md"))
+    return [*own, *laws, *scripts, *beside]
 
 
 def errors_of(path: Path) -> Iterator[str]:

@@ -15,7 +15,7 @@ import pictures
 from repository import repository
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
-from writing import DOCS, ROOT, key_table, plain, prose, put, table
+from writing import DOCS, LAWS, key_table, plain, prose, put, table
 
 RULES = ("neighbour", "boundary", "flock", "decide")
 PAPERS = {
@@ -47,7 +47,7 @@ def write_all(drawn: bool = False) -> None:
 
 def equations(name: str) -> dict[str, str]:
     """Equations of a model by the function that computes them."""
-    parts = re.split(r"^## (\w+)\n", (DOCS / "equations" / f"{name}.md").read_text(encoding="utf-8"), flags=re.M)
+    parts = re.split(r"^## (\w+)\n", (LAWS / name / "equations.md").read_text(encoding="utf-8"), flags=re.M)
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
@@ -62,7 +62,7 @@ def models(drawn: bool) -> None:
     for name in MODELS:
         model = find_law(name)
         title, _, rest = model.doc.strip().partition("\n")
-        source = (ROOT / "src/airflock/parts/laws" / f"{name}.py").read_text(encoding="utf-8")
+        source = (LAWS / name / "law.py").read_text(encoding="utf-8")
         functions = {
             node.name: ast.get_source_segment(source, node) or ""
             for node in ast.parse(source).body
@@ -71,9 +71,9 @@ def models(drawn: bool) -> None:
         written = equations(name)
         missing = sorted(set(written) - set(functions))
         if missing:
-            raise ExtensionError(f"equations/{name}.md: no function {', '.join(missing)} in the model")
+            raise ExtensionError(f"{name}/equations.md: no function {', '.join(missing)} in the model")
         pieces = [f"# `{name}`\n\n**{plain(title)}**\n\n{prose(rest)}\n"]
-        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/parts/laws/{name}.py`.\n\n")
+        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/parts/laws/{name}/law.py`.\n\n")
         pieces.append(pictures.shown(pictures.OF_MODEL[name], 1, "A picture of it", there=drawn))
         pieces.append("\n## Equations beside code\n")
         for rule, text in written.items():

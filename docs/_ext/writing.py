@@ -7,6 +7,7 @@ from typing import Any
 
 DOCS = Path(__file__).parents[1]
 ROOT = DOCS.parent
+LAWS = ROOT / "src" / "airflock" / "parts" / "laws"
 OUT = DOCS / "generated"
 
 

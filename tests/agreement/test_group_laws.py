@@ -102,7 +102,7 @@ def test_what_is_shown_of_an_agent_is_of_its_law():
     flight = airflock.open(scenario, 2, device="python").advance(1.0).sense()
     for agent, law in ((0, "vasarhelyi_2018"), (1, "kidger")):
         view = flight.look(agent)
-        assert type(view.sums).__module__ == f"airflock.parts.laws.{law}"
+        assert type(view.sums).__module__ == f"airflock.parts.laws.{law}.law"
         live = [k for k, value in enumerate(view.sums) if value]
         summed = np.sum([term for term in view.terms], axis=0)
         assert live and np.allclose(np.array(view.sums)[live], summed[live])

@@ -74,8 +74,9 @@ def test_code_and_equations_are_no_words(tmp_path, monkeypatch):
 
 def test_every_model_has_its_equations_beside_functions_that_exist():
     for name in MODELS:
-        written = re.findall(r"^## (\w+)$", (DOCS / "equations" / f"{name}.md").read_text(encoding="utf-8"), re.M)
-        source = (DOCS.parent / "src/airflock/parts/laws" / f"{name}.py").read_text(encoding="utf-8")
+        folder = DOCS.parent / "src" / "airflock" / "parts" / "laws" / name
+        written = re.findall(r"^## (\w+)$", (folder / "equations.md").read_text(encoding="utf-8"), re.M)
+        source = (folder / "law.py").read_text(encoding="utf-8")
         functions = {node.name for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
         assert "decide" in written and set(written) <= functions
 

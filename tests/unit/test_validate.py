@@ -10,7 +10,7 @@ import airflock
 from airflock.cli.main import app
 from airflock.support.errors import AirflockError, ScenarioError
 
-STUDY = Path(airflock.__file__).parent / "scenarios" / "studies" / "zapotecatl_2016" / "best.toml"
+STUDY = Path(airflock.__file__).parent / "parts/laws/reynolds_1987/studies/zapotecatl_2016/best.toml"
 
 
 def validate(*names):

@@ -38,6 +38,7 @@ from .fault_entries import (
     merge_onsets as merge_onsets,
 )
 from .files import (
+    files_of_laws as files_of_laws,
     load as load,
     load_if_named as load_if_named,
     presets as presets,

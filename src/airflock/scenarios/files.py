@@ -45,14 +45,20 @@ def presets() -> dict[str, Path]:
     >>> "vicsek_1995/ordered" in airflock.presets()
     True
     """
-    return dict(_shipped())
+    return dict(files_of_laws("presets"))
 
 
 @cache
-def _shipped() -> tuple[tuple[str, Path], ...]:
-    """Return name and file of every preset: installed files do not change while a process runs."""
-    root = Path(str(resources.files("airflock"))) / "scenarios" / "presets"
-    return tuple((str(path.relative_to(root).with_suffix("")), path) for path in sorted(root.rglob("*.toml")))
+def files_of_laws(folder: str) -> Mapping[str, Path]:
+    """Return name → file of what the laws of the package bring in a folder: "presets" or "studies".
+
+    The name is LAW/FILE; one in a folder within is named by that, as a publication that flies another's law.
+    """
+    found = {}
+    for path in Path(str(resources.files("airflock.parts.laws"))).glob(f"*/{folder}/**/*.toml"):
+        owner = path.parent if path.parent.name != folder else path.parents[1]
+        found[f"{owner.name}/{path.stem}"] = path
+    return {name: found[name] for name in sorted(found, key=lambda name: Path(f"{name}.toml"))}
 
 
 def load(

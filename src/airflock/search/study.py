@@ -5,14 +5,13 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from html import escape
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from airflock import __version__
 from airflock.certificates import EventLimit
 from airflock.runs import SearchSpace, declared_numbers, fingerprint
-from airflock.scenarios import Scenario, formats, html_table, load, presets, schema, tells_of_study
+from airflock.scenarios import Scenario, files_of_laws, formats, html_table, load, presets, schema, tells_of_study
 from airflock.search.objectives import Objective, read_limits, read_objectives
 from airflock.search.search_settings import CONSTANT_SEEDS_SHARE, SEED_BITS, SearchSettings, search_errors
 from airflock.search.study_space import default_space, read_space
@@ -121,8 +120,7 @@ def _unpublished(scenario: Scenario) -> dict[str, Any]:
 
 def shipped_studies() -> dict[str, Path]:
     """Return name → file of each shipped study; a study for a preset bears the preset's name."""
-    root = Path(str(resources.files("airflock"))) / "scenarios" / "studies"
-    return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
+    return dict(files_of_laws("studies"))
 
 
 def is_study(name: str | os.PathLike[str]) -> bool:

@@ -76,7 +76,8 @@ class DriverSource:
         drawn = inspect.isfunction(item) and item.__module__ == random_streams.__name__
         if drawn and item.__name__ in random_streams.PRIMITIVES:
             return str(item.__name__)  # bound by the device
-        module = str(getattr(item, "__module__", "")).rpartition(".")[2].strip("_")
+        # A law of the package is laws/NAME/law.py: its folder names it.
+        module = str(getattr(item, "__module__", "")).removesuffix(".law").rpartition(".")[2].strip("_")
         said = [text for text in chosen.values() if text.isidentifier()]
         name = base = to_identifier("_".join([module, item.__name__, *said]))
         count = 1
