@@ -27,7 +27,7 @@ from statistics import mean, stdev
 
 import airflock
 from airflock.core.parameters import number_names
-from airflock.parts.faults.fault_kinds import KINDS
+from airflock.parts import FAULTS as KINDS
 
 PRESET, STEPS, END = "vasarhelyi_2018/4ms", 4000, 1e5
 STILL = {"east": 0.0, "north": 0.0, "up": 0.0}

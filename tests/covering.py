@@ -10,11 +10,7 @@ from random import Random
 
 from airflock.core.parameters import choices, declarations
 from airflock.engine import plan_of
-from airflock.parts.bodies.body_kinds import BODIES
-from airflock.parts.faults.fault_kinds import KINDS
-from airflock.parts.radios.radio_kinds import RADIOS
-from airflock.parts.sensors.sensor_kinds import SENSORS
-from airflock.parts.topologies.topology_kinds import TOPOLOGIES
+from airflock.parts import BODIES, FAULTS as KINDS, RADIOS, SENSORS, TOPOLOGIES
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.scenarios.sections import SECTIONS
 from flocks import ISLANDS, NOTCHED, scenario

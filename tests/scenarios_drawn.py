@@ -13,15 +13,13 @@ from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
+from airflock.parts.bodies.body_kinds import BODIES as KNOWN_BODIES
 from numpy.typing import NDArray
 
 from airflock.core.model import Model
 from airflock.core.parameters import Choice, Parameters, Quantity, choices, declarations, quantity
 from airflock.core.topology import topology as topology_of_ones_own
-from airflock.parts.bodies.body_kinds import BODIES as KNOWN_BODIES
-from airflock.parts.faults.fault_kinds import KINDS
-from airflock.parts.radios.radio_kinds import RADIOS
-from airflock.parts.sensors.sensor_kinds import SENSORS
+from airflock.parts import FAULTS as KINDS, RADIOS, SENSORS
 from airflock.scenarios.named_code import MODELS, find_law
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario import Scenario

@@ -9,7 +9,7 @@ from writing import key_table, plain, prose, put
 def faults() -> None:
     """A section for each kind of fault: what it does, the rules that disturb a flight, its numbers."""
     from airflock.core.fault import FAULT_RULES
-    from airflock.parts.faults.fault_kinds import KINDS
+    from airflock.parts import FAULTS as KINDS
     from airflock.scenarios.keys import sections
 
     known = sections()
@@ -29,7 +29,7 @@ def faults() -> None:
 
 def topologies() -> None:
     """A section for each topology: what it means, its rule, the numbers that it reads."""
-    from airflock.parts.topologies.topology_kinds import TOPOLOGIES
+    from airflock.parts import TOPOLOGIES
     from airflock.scenarios.keys import sections
 
     pieces = [

@@ -179,10 +179,8 @@ def robots() -> None:
     import sys
 
     from airflock.core import radio as radios, silence
+    from airflock.parts import BODIES, RADIOS, SENSORS
     from airflock.parts.bodies import wind
-    from airflock.parts.bodies.body_kinds import BODIES
-    from airflock.parts.radios.radio_kinds import RADIOS
-    from airflock.parts.sensors.sensor_kinds import SENSORS
     from airflock.scenarios.keys import keys as keys_of
 
     pieces = [

@@ -5,7 +5,7 @@ import pytest
 
 import airflock
 from airflock.engine import fly_world
-from airflock.parts.faults.fault_kinds import KINDS
+from airflock.parts import FAULTS as KINDS
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly
 

@@ -8,7 +8,7 @@ import pytest
 
 import airflock
 from airflock.engine import driver_text, fly_world, plan_of
-from airflock.parts.faults.fault_kinds import KINDS
+from airflock.parts import FAULTS as KINDS
 from airflock.recordings.scores import measure_recording
 from airflock.recordings.simulation import recording_of
 from airflock.scenarios.files import load, presets

@@ -19,9 +19,8 @@ from airflock.core.pilot import PacketPolicy, Pilot
 from airflock.core.silence import Parameters as Silence, could_be_near, counts, for_standing_neighbour, with_defaults
 from airflock.drones.onboard.card import to_tuples
 from airflock.fleets.card_document import to_json_table
-from airflock.parts.bodies.body_kinds import BODIES
+from airflock.parts import BODIES, RADIOS
 from airflock.parts.laws import dimock_2003, vasarhelyi_2018, vicsek_1995
-from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.support.errors import RuleError
 from airflock.world import arena
 from airflock.world.world_map import Shapes, WorldMap, counter_clockwise, polygon_error

@@ -9,7 +9,7 @@ import pytest
 
 import airflock
 from airflock.engine import fly_world, plan_of
-from airflock.parts.radios.radio_kinds import RADIOS
+from airflock.parts import RADIOS
 from airflock.scenarios.files import load
 from airflock.support.errors import RuleError, ScenarioError
 from flocks import ISLANDS

@@ -9,7 +9,7 @@ import pytest
 
 import airflock
 from airflock.engine import fly_world
-from airflock.parts.sensors.sensor_kinds import SENSORS
+from airflock.parts import SENSORS
 from airflock.scenarios.files import load
 from airflock.support.errors import RuleError, ScenarioError
 from reference.flight import fly_plainly

@@ -17,7 +17,7 @@ from airflock.fleets.drone_faults import DroneFaults
 from airflock.fleets.lockstep import LockstepFleet, is_clear_between
 from airflock.fleets.radio_channel import FaultyNode
 from airflock.fleets.realtime import fly_in_realtime, lockstep_only_errors
-from airflock.parts.faults.fault_kinds import KINDS
+from airflock.parts import FAULTS as KINDS
 from airflock.recordings.simulation import simulate
 from airflock.support.errors import CardError
 from fleets import card, document, scenario

@@ -31,8 +31,8 @@ from airflock.fleets.drone_faults import INJECTED_KINDS, InjectedFault, read_inj
 from airflock.fleets.lockstep import MotionNoise, SensorWords
 from airflock.fleets.radio_channel import SOFTWARE_KEY, PacketNumbers, RadioChannel
 from airflock.fleets.vehicle import POSITION_GAIN, STANDING_SPEED, SoftwareVehicle
+from airflock.parts import RADIOS
 from airflock.parts.radios import jitter, links
-from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.recordings.scores import measure_recording
 from airflock.recordings.simulation import simulate
 from airflock.support.coordinates import FlightSite

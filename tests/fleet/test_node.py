@@ -25,7 +25,7 @@ from airflock.fleets.drone_faults import InjectedFault
 from airflock.fleets.lockstep import START_TIME
 from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.fleets.vehicle import SoftwareVehicle
-from airflock.parts.bodies import BODIES
+from airflock.parts import BODIES
 from airflock.support.coordinates import Geodetic
 from airflock.support.errors import CardError, LinkError
 from fleets import PRIVATE, card, document, fleet, scenario

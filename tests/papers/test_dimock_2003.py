@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airflock.engine import fly_world
-from airflock.parts.metrics import fitness_dimock
+from airflock.parts.metric_sets import dimock as fitness_dimock
 from airflock.scenarios.files import load
 from airflock_papers.dimock_2003 import flights, ga, ga_claims, robust, robust_claims, static
 from airflock_papers.dimock_2003.flights import Flight, Start, Task, in_row

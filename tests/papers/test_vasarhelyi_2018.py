@@ -11,7 +11,7 @@ import xarray as xr
 
 import airflock
 from airflock.core.maths import bell, peak, rising
-from airflock.parts.metrics.fitness_vasarhelyi import fitness
+from airflock.parts.metric_sets.vasarhelyi import fitness
 from airflock.support.errors import AirflockError
 from airflock_papers import bounds, statistics
 from airflock_papers.claims import Claim, judge, read_claims

@@ -12,7 +12,7 @@ from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, Percept
 from airflock.engine import score_flights
 from airflock.parts.laws import kidger
-from airflock.parts.metrics import fitness_kidger
+from airflock.parts.metric_sets import kidger as fitness_kidger
 from airflock.world import goals
 from needed import needed
 

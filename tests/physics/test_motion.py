@@ -7,8 +7,8 @@ import pytest
 
 import airflock
 from airflock.core import random
+from airflock.parts import BODIES
 from airflock.parts.bodies import autopilot, jostled, motion, wind
-from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.sensors import langevin
 from airflock.scenarios.files import load
 from airflock.scenarios.flight_world import FlightWorld

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from airflock.core.radio import FEW_PACKETS, either, loss_probability, lost, packets
+from airflock.parts import RADIOS
 from airflock.parts.radios.links import Parameters, missed, missed_few, power, received, thrice
-from airflock.parts.radios.radio_kinds import RADIOS
 
 K = Parameters(loss=0.3)
 

@@ -9,8 +9,8 @@ from hypothesis import given, strategies as st
 
 from airflock.core.radio import PacketReception, arrival_probability, packets
 from airflock.estimate.identification.radio_links import table_entries
+from airflock.parts import RADIOS
 from airflock.parts.radios import bursts, congestion, jitter, links, shadow, table
-from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.support.errors import RecordingError
 
 ENTRIES = [f"received_{n}" for n in range(table.ENTRIES)]

@@ -8,7 +8,7 @@ import pytest
 import airflock
 from airflock.core.contract import State
 from airflock.core.sensor import SensorState
-from airflock.parts.sensors.sensor_kinds import SENSORS
+from airflock.parts import SENSORS
 
 PERIOD = 0.2
 REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

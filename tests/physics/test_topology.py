@@ -10,10 +10,10 @@ from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from airflock.core.agent import HeardNeighbour, met_neighbours
 from airflock.core.contract import State
+from airflock.parts import TOPOLOGIES
 from airflock.parts.topologies.parameters import Parameters
 from airflock.parts.topologies.ranking import HEARD_LIMIT, kth_least
 from airflock.parts.topologies.strongest import loss
-from airflock.parts.topologies.topology_kinds import TOPOLOGIES
 
 HERE = State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 SEEDS = st.integers(0, 2**32 - 1)

@@ -20,12 +20,9 @@ from airflock.core.model import model
 from airflock.core.radio import radio
 from airflock.core.sensor import sensor
 from airflock.core.topology import topology
-from airflock.parts.bodies.body_kinds import BODIES
+from airflock.parts import BODIES, METRICS, RADIOS, SENSORS, SETS
 from airflock.parts.laws import vasarhelyi_2018, viragh_2014
 from airflock.parts.laws.vasarhelyi_2018 import Sums
-from airflock.parts.metrics.metric_sets import METRICS, SETS
-from airflock.parts.radios.radio_kinds import RADIOS
-from airflock.parts.sensors.sensor_kinds import SENSORS
 from airflock.scenarios.named_code import MODELS, find_law
 from airflock.support.errors import RuleError, ScenarioError
 

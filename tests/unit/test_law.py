@@ -19,8 +19,7 @@ from airflock.core.model import model
 from airflock.core.vocabulary import VOCABULARY
 from airflock.engine.text.generate import DriverSource
 from airflock.engine.text.probe import probe_model
-from airflock.parts.bodies.body_kinds import BODIES
-from airflock.parts.metrics.metric_sets import METRICS
+from airflock.parts import BODIES, METRICS
 from airflock.scenarios.named_code import MODELS
 from airflock.support.errors import RuleError
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import airflock
-from airflock.parts.metrics.metric_sets import SETS
+from airflock.parts import SETS
 from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.recordings.scores import (
     IN_BODIES,

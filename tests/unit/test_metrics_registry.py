@@ -3,7 +3,8 @@
 import pytest
 
 import airflock
-from airflock.parts.metrics.metric_sets import METRICS, SETS, reported_values
+from airflock.parts import METRICS, SETS
+from airflock.parts.metrics.metric_sets import reported_values
 
 
 def test_each_kind_tells_of_its_own_fitness():

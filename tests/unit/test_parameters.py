@@ -18,7 +18,7 @@ from airflock.core.parameters import (
     quantity_error,
 )
 from airflock.core.silence import Parameters as Silence, with_defaults
-from airflock.parts.bodies.body_kinds import BODIES
+from airflock.parts import BODIES
 from airflock.scenarios.files import load
 from airflock.scenarios.named_code import MODELS
 from airflock.scenarios.sections import SECTIONS

@@ -7,7 +7,7 @@ import pytest
 
 from airflock.core.law import fields_read
 from airflock.core.vocabulary import Mean
-from airflock.parts.metrics.metric_sets import METRICS
+from airflock.parts import METRICS
 
 RECORDS = {"pair", "shared", "memory", "wing", "q", "agents", "clusters", "members"}
 RULES = [

@@ -9,9 +9,7 @@ import pytest
 import airflock
 from airflock.core import ENTRY_KEYS
 from airflock.core.parameters import Quantity, declarations
-from airflock.parts.bodies.body_kinds import BODIES
-from airflock.parts.faults.fault_kinds import KINDS
-from airflock.parts.sensors.sensor_kinds import SENSORS
+from airflock.parts import BODIES, FAULTS as KINDS, SENSORS
 from airflock.scenarios import groups, keys
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.named_code import MODELS, find_law

@@ -14,7 +14,7 @@ from airflock import __version__
 from airflock.certificates.limits import R_COLL_METRICS, EventLimit, parse_limits
 from airflock.core import Quantity, declarations
 from airflock.engine import driver_text
-from airflock.parts.sensors import DEFAULT_SENSOR
+from airflock.parts import SENSORS
 from airflock.runs import (
     ScenarioTask,
     ScoreFunction,
@@ -399,7 +399,7 @@ def scenario_identity(scenario: Scenario) -> str:
             del document[section][key]
     document["laws"] = [scenario.model.name, scenario.body.rule.name]
     # The default is left out, so that certificates from before there were others stay what they are.
-    if scenario.sensors.rule.name != DEFAULT_SENSOR:
+    if scenario.sensors.rule.name != SENSORS.default:
         document["laws"].append(scenario.sensors.rule.name)
     if "kind" not in document["radio"]:  # which distinguishes records that are not the usual one
         document["laws"].append(scenario.radio.rule.name)

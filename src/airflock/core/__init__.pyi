@@ -15,10 +15,10 @@ from .body import Body as Body, BodyParameters as BodyParameters, body as body, 
 from .contract import (
     CLOCKS as CLOCKS,
     COMMANDS as COMMANDS,
+    Kind as Kind,
     State as State,
     argument_names as argument_names,
     call_rule as call_rule,
-    find_members as find_members,
     initial_values as initial_values,
     namespace_names as namespace_names,
 )

@@ -1,4 +1,4 @@
-"""The contract that all kinds of rule share: where rules are gathered from, and how they are called.
+"""The contract that all kinds of part share: where members are found, and how their rules are gathered and called.
 
 A rule is a plain function of floats. The names of its arguments are its declaration: a driver computes and passes only
 what the rule requests, in any order. `core.vocabulary` lists the names. A file of rules may bring records of its own
@@ -6,15 +6,18 @@ what the rule requests, in any order. `core.vocabulary` lists the names. A file 
 """
 
 import inspect
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import make_dataclass
-from functools import cache
+import sys
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field, make_dataclass
+from functools import cache, cached_property
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, NamedTuple, TypeVar
 
 from airflock.core.parameters import Parameters, number_names
-from airflock.support import RuleError, shortened, suggest
+from airflock.support import AirflockError, RuleError, describe_error, shortened, suggest
 
 T = TypeVar("T")
 COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": "1"}  # and their units
@@ -47,26 +50,131 @@ def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str
     return found, name or str(found.get("NAME") or found.get("__name__", "own")).rpartition(".")[2].strip("_")
 
 
-def find_members(package: str, rules: Collection[str], gather: Callable[[Any], T]) -> dict[str, T]:
-    """Gather the parts of one kind from the modules of a folder, by name in alphabetical order.
+@dataclass(frozen=True, eq=False)
+class Kind(Mapping[str, T]):
+    """A kind of part: its members by name, and where a scenario names one.
 
-    A file that is laid into the folder is a member; no list names it.
+    Members are the files and folders of one folder of the package, and of the folder of the same name in every
+    installed package that declares the entry point `airflock.parts`. No list names them: a file that is laid there is
+    a member. One that cannot be used is left out with a warning of one line; the others go on working.
 
-    package : dotted name of the folder; rules: a module that defines one of them is a part, others are helpers
-    gather  : makes a part from a module, such as `airflock.body`
-
-    Raises RuleError if two modules have one name.
+    folder  : dotted name of the folder; its last part names the kind ("topologies")
+    noun    : what messages call a member
+    make    : makes a member from a module and a name, such as `airflock.body`
+    member  : class of a member
+    rules   : a file that defines one of them is a member, others are helpers; none: every one is a member
+    section : table of a scenario file, and field of a Scenario; empty where no section names one
+    default : name of the member where a scenario names none
+    fixed   : members that are no file; they come first
+    shared  : keys of the section that mean the same for every member, so that they stay when it changes; None: all
+    take    : makes a member from other objects of the caller, if more than a member or a namespace is accepted
+    check   : name of the public function that runs the standing list of truths on a member
     """
-    members: dict[str, T] = {}
-    folder = import_module(package)
-    for entry in iter_modules(folder.__path__, f"{package}."):
-        module = import_module(entry.name)
-        if any(rule in vars(module) for rule in rules):
-            name = namespace_names(module)[1]
-            if name in members:
-                raise RuleError(f"{entry.name}: another file of {package} is named {name!r}, too")
-            members[name] = gather(module)
-    return dict(sorted(members.items()))
+
+    folder: str
+    noun: str
+    make: Callable[..., T]
+    member: type[T]
+    rules: Collection[str]
+    section: str = ""
+    default: str = ""
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    shared: tuple[str, ...] | None = ()
+    take: Callable[[Any], T] | None = None
+    check: str = ""
+
+    __hash__ = object.__hash__
+
+    def __getitem__(self, name: str) -> T:
+        return self._members[0][name]
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and name in self._members[0]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._members[0])
+
+    def __len__(self) -> int:
+        return len(self._members[0])
+
+    @property
+    def errors(self) -> Mapping[str, str]:
+        """Name → why the file or folder of this name is no member, one line."""
+        return self._members[1]
+
+    @cached_property
+    def _members(self) -> tuple[dict[str, T], dict[str, str]]:
+        """Gather the members by name, and the errors of those that are left out."""
+        members: dict[str, T] = {}
+        errors: dict[str, str] = {}
+        own = self.folder.rpartition(".")[2]
+        # The package comes first, so that no installed one can put another rule behind a known name.
+        for owner, folder in (("airflock", self.folder), *((owner, f"{top}.{own}") for owner, top in installed())):
+            for path, module in _modules(folder, owner):
+                name = path.stem
+                try:
+                    found = import_module(module)
+                    if self.rules and not any(rule in vars(found) for rule in self.rules):
+                        errors[name] = f"{owner}: {path} is no {self.noun}: it has none of {', '.join(self.rules)}"
+                        continue
+                    name = namespace_names(found)[1]
+                    if name in members or name in self.fixed:
+                        raise RuleError(f"another {self.noun} is named {name!r}; that one is used")
+                    members[name] = self.make(found, name)
+                except Exception as error:  # a file may fail in any way, and the others must still fly
+                    errors[name] = _left_out(f"{owner}: {path}", error)
+        return {**self.fixed, **dict(sorted(members.items()))}, errors
+
+    @property
+    def records(self) -> dict[str, type]:
+        """Records of parameters by name, of those members that have their own."""
+        return {name: record for name, one in self.items() if (record := getattr(one, "Parameters", None)) is not None}
+
+    def unknown(self, name: Any, more: str = "") -> str:
+        """Return what is wrong with a name that is none of a member, and the nearest right one."""
+        if isinstance(name, str) and name in self.errors:
+            return self.errors[name]
+        known = f"known: {', '.join(self)}{more}"
+        return f"unknown {self.noun}; {suggest(name, self, known, cutoff=0.4)}"
+
+
+@cache
+def installed() -> tuple[tuple[str, str], ...]:
+    """Return name and module of every installed package that brings parts: its entry point `airflock.parts`."""
+    # Most often nobody brings any, and to import `importlib.metadata` takes a tenth of the time of a scenario.
+    files = (file for place in sys.path for file in Path(place).glob("*.dist-info/entry_points.txt"))
+    if not any(b"[airflock.parts]" in file.read_bytes() for file in files):
+        return ()
+    from importlib.metadata import entry_points
+
+    found = []
+    for point in entry_points(group="airflock.parts"):
+        owner = point.dist.name if point.dist else point.name
+        try:
+            found.append((owner, point.load().__name__))
+        except Exception as error:  # a package of somebody else may fail in any way
+            _left_out(f"{owner}: {point.value}", error)
+    return tuple(sorted(found))
+
+
+def _modules(folder: str, owner: str) -> list[tuple[Path, str]]:
+    """Return path and dotted name of the files and folders in a folder; none where a package has no such folder."""
+    try:
+        places = import_module(folder).__path__
+    except Exception as error:  # a package of somebody else may fail in any way
+        if getattr(error, "name", "") != folder:
+            _left_out(f"{owner}: {folder}", error)
+        return []
+    found = ((entry, Path(getattr(entry.module_finder, "path", "")) / entry.name) for entry in iter_modules(places))
+    return [(path if entry.ispkg else path.with_suffix(".py"), f"{folder}.{entry.name}") for entry, path in found]
+
+
+def _left_out(where: str, error: Exception) -> str:
+    """Return the line of a file that cannot be used, after a warning of it."""
+    text = str(error).splitlines()[0] if isinstance(error, AirflockError) else describe_error(error)
+    line = f"{where}: {shortened(text)}; it is left out"
+    warnings.warn(line, stacklevel=2)
+    return line
 
 
 def merge_parameters(common: type, record: Any, owner: str) -> type:

@@ -22,9 +22,7 @@ from airflock.core import (
     vector_sizes,
 )
 from airflock.engine.text.probe import probe_body, probe_fault, probe_model, probe_radio, probe_sensor, probe_topology
-from airflock.parts.bodies import BODIES
-from airflock.parts.radios import DEFAULT_RADIO as USUAL_RADIO, RADIOS
-from airflock.parts.sensors import DEFAULT_SENSOR, SENSORS
+from airflock.parts import BODIES, RADIOS, SENSORS
 from airflock.scenarios import Scenario, box_fits_cells, metrics_use_cells, step_counts, uses_all_cores, uses_cells
 from airflock.support import check_precision
 from airflock.world import (
@@ -120,7 +118,7 @@ class PlanProperties:
     ray: Callable[..., float] = rays.to_nothing
     body: Body = BODIES["multirotor"]
     body_choices: tuple[tuple[str, str], ...] = ()
-    sensor: Sensor = SENSORS[DEFAULT_SENSOR]
+    sensor: Sensor = SENSORS[SENSORS.default]
     sensor_choices: tuple[tuple[str, str], ...] = ()
     edge_rule: Callable[..., Any] | None = None
     start: str = "arena"
@@ -138,7 +136,7 @@ class PlanProperties:
     has_sensor_error: bool = True
     delayed: bool = True
     lossy: bool = False
-    radio: Radio = RADIOS[USUAL_RADIO]
+    radio: Radio = RADIOS[RADIOS.default]
     radio_choices: tuple[tuple[str, str], ...] = ()
     few: bool = True
     stops_for_lost: bool = False

@@ -9,6 +9,7 @@ from shapely.geometry import Polygon
 
 from airflock.core import BodyParameters, Parameters, forward, with_defaults
 from airflock.drones import CARD_VERSION, SafetyLimits
+from airflock.parts import LAWS
 from airflock.parts.bodies import Parameters as Multirotor
 from airflock.scenarios import Scenario
 from airflock.support import CardError, FlightSite, ScenarioError
@@ -199,9 +200,8 @@ def _with_dead_time(record: BodyParameters | SafetyLimits) -> dict[str, Any]:
 def _check_flyable(scenario: Scenario) -> None:
     """Raise CardError where a scenario has a part that no card can hold."""
     fault = ""
-    others = [
-        law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.parts.laws.")
-    ]
+    ours = {law.decide for law in LAWS.values()}
+    others = [law.model.name for law in scenario.laws if law.model.decide not in ours]
     if scenario.world.arena == "none":
         fault = "world.arena = 'none': a card needs walls, and a fence around them"
     elif scenario.own_topology is not None:

@@ -33,7 +33,7 @@ from airflock.drones import (
 )
 from airflock.fleets.drone_faults import INJECTED_KINDS, InjectedFault
 from airflock.fleets.radio_channel import SOFTWARE_KEY
-from airflock.parts.faults import KINDS as OURS
+from airflock.parts import FAULTS as OURS
 from airflock.support import LinkError, printable
 
 # ---- Telemetry broadcast

@@ -1,1 +1,5 @@
 """Parts: plain scalar rules with their numbers, one folder a kind."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.parts.faults import KINDS
+from airflock.parts import FAULTS as KINDS
 from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_dataset
 from airflock.scenarios import MODELS
 from airflock.support import RecordingError, as_error, parse_json_object, shortened

@@ -7,8 +7,9 @@ import numpy as np
 import xarray as xr
 
 from airflock.core import Model, Own, PacketParameters, Parameters, argument_names, declarations, number_names
+from airflock.parts import SETS
 from airflock.parts.aero import descent
-from airflock.parts.metrics import POWER_SETTINGS, SETS
+from airflock.parts.metrics import POWER_SETTINGS
 from airflock.recordings.attributes import check_format, metrics_settings, scenario_document, uses_user_law
 from airflock.recordings.dataset import recording_frames
 from airflock.scenarios import PART_KINDS, SECTIONS, CallerParts, Scenario, build_scenario, settings_dict
@@ -126,7 +127,7 @@ def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
     for family in PART_KINDS:
         table = document.get(family.section)
         kind = str(table.get("kind") or "") if isinstance(table, Mapping) else ""
-        if kind and kind not in family.shipped:
+        if kind and kind not in family:
             found[family.section] = kind
     return found
 

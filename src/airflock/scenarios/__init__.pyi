@@ -66,12 +66,7 @@ from .named_code import (
     user_error_line as user_error_line,
 )
 from .part_kinds import (
-    BODY_KIND as BODY_KIND,
-    METRIC_SET_KIND as METRIC_SET_KIND,
     PART_KINDS as PART_KINDS,
-    RADIO_KIND as RADIO_KIND,
-    SENSOR_KIND as SENSOR_KIND,
-    TOPOLOGY_KIND as TOPOLOGY_KIND,
     CallerParts as CallerParts,
 )
 from .scaling import starting_set as starting_set

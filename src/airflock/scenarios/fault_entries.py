@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from airflock.core import ENTRY_KEYS, Fault, Parameters as Record, fault, quantity, random
-from airflock.parts.faults import KINDS
+from airflock.parts import FAULTS as KINDS
 from airflock.scenarios import schema
 from airflock.scenarios.groups import Group, read_members
 from airflock.scenarios.named_code import build_from_file

@@ -8,10 +8,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from airflock.core import Fault, PacketParameters, fault, number_names, without_replaced
+from airflock.core import Fault, Kind, PacketParameters, fault, number_names, without_replaced
 from airflock.scenarios import formats, schema
 from airflock.scenarios.named_code import law_from_caller
-from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, PartKind
+from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, kept_keys, part_from_caller
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.scenarios.schema import value_of
@@ -182,7 +182,7 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
 
 
 def _with_given(
-    document: Mapping[str, Any], given: Iterable[tuple[PartKind[Any], Any]]
+    document: Mapping[str, Any], given: Iterable[tuple[Kind[Any], Any]]
 ) -> tuple[dict[str, Any], CallerParts]:
     """Put the caller's parts into a document; return it, and the parts that are not found by their names alone.
 
@@ -196,13 +196,13 @@ def _with_given(
             continue
         table, kind = document.get(family.section, {}), str(part)
         # A name of the package needs no object: the document finds it by the name.
-        if not (isinstance(part, str) and part in family.shipped):
-            own_part, more = family.from_caller(part)
+        if not (isinstance(part, str) and part in family):
+            own_part, more = part_from_caller(family, part)
             errors += more
             if own_part is None:
                 continue
             rules[family.section], kind = own_part, own_part.name
-        document[family.section] = {**family.kept(table, kind), "kind": kind}
+        document[family.section] = {**kept_keys(family, table, kind), "kind": kind}
     if errors:
         raise ScenarioError(errors)
     return document, CallerParts(**rules)

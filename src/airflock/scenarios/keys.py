@@ -10,10 +10,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from airflock.core import Choice, PacketParameters, Points, Quantity, Text, declarations, format_with_unit, number_names
-from airflock.parts.bodies import BODIES
-from airflock.parts.faults import KINDS
-from airflock.parts.radios import RADIOS
-from airflock.parts.sensors import SENSORS
+from airflock.parts import BODIES, FAULTS as KINDS, RADIOS, SENSORS
 from airflock.scenarios.fault_entries import FaultTiming
 from airflock.scenarios.named_code import MODELS, find_law
 from airflock.scenarios.sections import SECTIONS, Flight

@@ -13,13 +13,14 @@ import os
 import sysconfig
 import traceback
 from collections.abc import Callable, Mapping
-from importlib import import_module, util
+from importlib import util
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
 from airflock.core import Model, bound_values, declarations, model
+from airflock.parts import LAWS as MODELS
 from airflock.support import (
     ParameterError,
     RuleError,
@@ -29,31 +30,24 @@ from airflock.support import (
     expand_path,
     is_file,
     shortened,
-    suggest,
     to_identifier,
 )
-
-MODELS = (
-    "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
-    "dimock_2003", "chen_2014", "couzin_2005",
-)  # fmt: skip
 
 
 def find_law(kind: Any, folder: Path | None = None, *, where: str = "model.kind", trust: bool = False) -> Model:
     """Find a law by name, or in a user's own file (relative to the scenario file), which runs only with `trust`."""
     if kind is None:
         section, _, key = where.rpartition(".")
-        how = f'write a law under [{section}], for instance {key} = "{MODELS[0]}"'
+        how = f'write a law under [{section}], for instance {key} = "{MODELS.default}"'
         others = f"known: {', '.join(MODELS)}, or a file that ends in .py"
         raise ScenarioError([f'{where} is missing; {how}, or begin the file with extends = "PRESET"; {others}'])
     if not isinstance(kind, str):
         raise ScenarioError([f"{where} = {shortened(repr(kind), 80)} is not a name; known: {', '.join(MODELS)}"])
     if kind in MODELS:
-        return model(import_module(f"airflock.parts.laws.{kind}"), kind)
+        return MODELS[kind]
     if kind.endswith(".py"):
         return build_from_file(model, where, kind, folder, trust=trust)
-    hint = suggest(kind, MODELS, f"known: {', '.join(MODELS)}, or a file that ends in .py", cutoff=0.4)
-    raise ScenarioError([f"{where} = {kind!r}: unknown model; {hint}"])
+    raise ScenarioError([f"{where} = {kind!r}: {MODELS.unknown(kind, ', or a file that ends in .py')}"])
 
 
 def law_from_caller(law: Any) -> Model:

@@ -6,14 +6,15 @@ consent to run it.
 """
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from airflock.core import (
     Body,
     Fault,
+    Kind,
     MetricSet,
     Model,
     PacketParameters,
@@ -21,104 +22,62 @@ from airflock.core import (
     Sensor,
     Topology,
     add_laws,
-    body,
     composition_errors,
     declarations,
     model,
-    number_names,
-    radio,
-    sensor,
-    topology,
 )
+from airflock.parts import BODIES, RADIOS, SENSORS, SETS, TOPOLOGIES, default_body
 from airflock.parts.aero import descent
-from airflock.parts.bodies import BODIES, default_body
-from airflock.parts.metrics import DEFAULT_SET, SETS, metric_set, to_metric_set
-from airflock.parts.radios import DEFAULT_RADIO, RADIOS
-from airflock.parts.sensors import DEFAULT_SENSOR, SENSORS
-from airflock.parts.topologies import DEFAULT_TOPOLOGY, TOPOLOGIES
 from airflock.scenarios.named_code import build_from_file, find_law
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
-from airflock.support import AirflockError, suggest
+from airflock.support import AirflockError
 
 T = TypeVar("T")
+PART_KINDS: tuple[Kind[Any], ...] = (SETS, BODIES, SENSORS, RADIOS, TOPOLOGIES)  # those that a section names
 
 
-@dataclass(frozen=True)
-class PartKind(Generic[T]):
-    """A kind of part that a section may name.
-
-    section : of a document, and field of a Scenario and of `CallerParts`; noun: in messages
-    shipped : parts of the package by name; None stands for a part that needs nothing
-    member  : class of such a part
-    gather  : makes a part from a namespace and a name
-    default : name of the part where the document names none; of bodies, for a law that commands a velocity
-    shared  : keys that mean the same for every kind, so that they stay when the kind changes; None: all of them
-    take    : makes a part from other objects of the caller, if more than a member or a namespace is accepted
-    """
-
-    section: str
-    noun: str
-    shipped: Mapping[str, T | None]
-    member: type[T]
-    gather: Callable[[Any, str], T]
-    default: str
-    shared: tuple[str, ...] | None = ()
-    take: Callable[[Any], T] | None = None
-
-    @property
-    def records(self) -> dict[str, type]:
-        """Records of parameters by name, of those parts of the package that have their own."""
-        own = {name: getattr(one, "Parameters", None) for name, one in self.shipped.items()}
-        return {name: record for name, record in own.items() if record is not None}
-
-    def named(self, kind: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[T | None, list[str]]:
-        """Find a part by its name, or in a file, which runs only with trust; return it, or None, with the errors."""
-        if isinstance(kind, str) and kind in self.shipped:
-            return self.shipped[kind], []
-        key = f"{self.section}.kind"
-        # Only the ending makes a name a file: a misspelt name must never run code.
-        if isinstance(kind, str) and kind.endswith(".py"):
-            try:
-                return build_from_file(self.gather, key, kind, folder, trust=trust), []
-            except AirflockError as error:
-                return None, str(error).splitlines()
-        hint = suggest(kind, self.shipped, f"known: {', '.join(self.shipped)}, or a file that ends in .py", cutoff=0.4)
-        return None, [f"{key} = {kind!r}: unknown {self.noun}; {hint}"]
-
-    def from_caller(self, part: Any) -> tuple[T | None, list[str]]:
-        """Make a part from a member, a namespace, a name or a file of the caller; return it, or None, with errors."""
-        if isinstance(part, (str, os.PathLike)):
-            return self.named(str(part), trust=True)
-        if self.take is not None:
-            return self.take(part), []
-        return part if isinstance(part, self.member) else self.gather(part, ""), []
-
-    def kind(self, document: Mapping[str, Any], default: str = "") -> Any:
-        """Return the kind that a document names, also if it is a table with value and source."""
-        table = document.get(self.section, {})
-        default = default or self.default
-        return value_of(table.get("kind", default)) if isinstance(table, Mapping) else default
-
-    def kept(self, table: Mapping[str, Any], new_kind: str) -> dict[str, Any]:
-        """Return the keys of a section that stay with another kind: all where both kinds have the same numbers."""
-        before = self.kind({self.section: table})
-        ours = [self.shipped[kind] for kind in (before, new_kind) if isinstance(kind, str) and kind in self.shipped]
-        same_numbers = len(ours) == 2 and len({getattr(one, "Parameters", None) for one in ours}) == 1
-        # Two kinds with one record (two bodies of the same numbers) keep all keys; else only the
-        # shared ones have a meaning.
-        every = self.shared is None or same_numbers or new_kind == before
-        return {key: value for key, value in table.items() if key != "kind" and (every or key in (self.shared or ()))}
+def part_by_name(
+    kind: Kind[T], name: Any, folder: Path | None = None, *, trust: bool = False
+) -> tuple[T | None, list[str]]:
+    """Find a part by its name, or in a file, which runs only with trust; return it, or None, with the errors."""
+    if name in kind:
+        return kind[name], []
+    key = f"{kind.section}.kind"
+    # Only the ending makes a name a file: a misspelt name must never run code.
+    if isinstance(name, str) and name.endswith(".py"):
+        try:
+            return build_from_file(kind.make, key, name, folder, trust=trust), []
+        except AirflockError as error:
+            return None, str(error).splitlines()
+    return None, [f"{key} = {name!r}: {kind.unknown(name, ', or a file that ends in .py')}"]
 
 
-BODY_KIND = PartKind("body", "body", BODIES, Body, body, "multirotor")
-METRIC_SET_KIND = PartKind(
-    "metrics", "set of order parameters", SETS, MetricSet, metric_set, DEFAULT_SET, None, to_metric_set
-)
-SENSOR_KIND = PartKind("sensors", "sensor", SENSORS, Sensor, sensor, DEFAULT_SENSOR, ("period",))
-RADIO_KIND = PartKind("radio", "radio", RADIOS, Radio, radio.radio, DEFAULT_RADIO, number_names(PacketParameters))
-TOPOLOGY_KIND = PartKind("topology", "topology", TOPOLOGIES, Topology, topology, DEFAULT_TOPOLOGY)
-PART_KINDS: tuple[PartKind[Any], ...] = (METRIC_SET_KIND, BODY_KIND, SENSOR_KIND, RADIO_KIND, TOPOLOGY_KIND)
+def part_from_caller(kind: Kind[T], part: Any) -> tuple[T | None, list[str]]:
+    """Make a part from a member, a namespace, a name or a file of the caller; return it, or None, with errors."""
+    if isinstance(part, (str, os.PathLike)):
+        return part_by_name(kind, str(part), trust=True)
+    if kind.take is not None:
+        return kind.take(part), []
+    return part if isinstance(part, kind.member) else kind.make(part, ""), []
+
+
+def named_kind(kind: Kind[Any], document: Mapping[str, Any], default: str = "") -> Any:
+    """Return the part that a document names, also if it is a table with value and source."""
+    table = document.get(kind.section, {})
+    default = default or kind.default
+    return value_of(table.get("kind", default)) if isinstance(table, Mapping) else default
+
+
+def kept_keys(kind: Kind[Any], table: Mapping[str, Any], new: str) -> dict[str, Any]:
+    """Return the keys of a section that stay with another part: all where both have the same numbers."""
+    before = named_kind(kind, {kind.section: table})
+    ours = [kind[name] for name in (before, new) if name in kind]
+    same_numbers = len(ours) == 2 and len({getattr(one, "Parameters", None) for one in ours}) == 1
+    # Two parts with one record (two bodies of the same numbers) keep all keys; else only the shared
+    # ones have a meaning.
+    every = kind.shared is None or same_numbers or new == before
+    return {key: value for key, value in table.items() if key != "kind" and (every or key in (kind.shared or ()))}
 
 
 @dataclass(frozen=True)
@@ -211,37 +170,37 @@ def collect_parts(
     The parts, with a stand-in for each missing one; the document without numbers that no stand-in knows; the errors.
     """
 
-    def one(family: PartKind[T], mine: T | None, usual: str) -> tuple[T, list[str]]:
+    def one(kind: Kind[T], mine: T | None, usual: str = "") -> tuple[T, list[str]]:
         """Return the caller's part or the document's; the default one, with errors, if it is missing."""
         if mine is not None:
             return mine, []
-        parts, errors = family.named(family.kind(document, usual), folder, trust=trust)
-        parts = family.shipped[usual] if parts is None else parts
-        assert parts is not None, "the usual one is one of ours"
-        return parts, errors
+        part, errors = part_by_name(kind, named_kind(kind, document, usual), folder, trust=trust)
+        return kind[usual or kind.default] if part is None else part, errors
 
     law, errors = _law(document, caller_parts, folder, trust)
     # A law that commands an acceleration needs another default body than one that commands a
     # velocity.
     usual = default_body(law.command if law else "velocity")
-    body, of_body = one(BODY_KIND, caller_parts.body, usual)
+    body, of_body = one(BODIES, caller_parts.body, usual)
     of_body = of_body or body_law_errors(
-        body, law, caller_parts.body.name if caller_parts.body else BODY_KIND.kind(document, usual)
+        body, law, caller_parts.body.name if caller_parts.body else named_kind(BODIES, document, usual)
     )
     # Check the rest of the document with a body that fits, so that one wrong name does not cause
     # ten more errors.
     if of_body and caller_parts.body is None:
         body = BODIES[usual]
-    metrics, of_metrics = one(METRIC_SET_KIND, caller_parts.metrics, METRIC_SET_KIND.default)
-    sensors, of_sensor = one(SENSOR_KIND, caller_parts.sensors, SENSOR_KIND.default)
-    transmission, of_radio = one(RADIO_KIND, caller_parts.radio, RADIO_KIND.default)
+    metrics, of_metrics = one(SETS, caller_parts.metrics)
+    sensors, of_sensor = one(SENSORS, caller_parts.sensors)
+    transmission, of_radio = one(RADIOS, caller_parts.radio)
     if of_radio:
-        transmission = Radio(str(RADIO_KIND.kind(document)), PacketParameters)  # the common numbers are judged
+        transmission = Radio(str(named_kind(RADIOS, document)), PacketParameters)  # the common numbers are judged
     topology, of_topology = caller_parts.topology, list[str]()
-    # Topologies of the package share one record, in which the kind is a choice; a file brings its
-    # own record.
-    if topology is None and str(kind := TOPOLOGY_KIND.kind(document)).endswith(".py"):
-        topology, of_topology = TOPOLOGY_KIND.named(kind, folder, trust=trust)  # ours are judged as a choice
+    # Topologies without numbers of their own share one record, in which the kind is a choice, and
+    # are judged as that.
+    name = named_kind(TOPOLOGIES, document)
+    own = getattr(TOPOLOGIES.get(str(name)), "Parameters", None)
+    if topology is None and (own is not None or str(name).endswith(".py")):
+        topology, of_topology = part_by_name(TOPOLOGIES, name, folder, trust=trust)
     parts = ScenarioParts(law, body, metrics, sensors, transmission, topology)
     errors_of = {
         "body": of_body,

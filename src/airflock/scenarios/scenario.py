@@ -26,11 +26,10 @@ from airflock.core import (
     random,
     with_defaults,
 )
+from airflock.parts import SENSORS, TOPOLOGIES
 from airflock.parts.aero import descent, wing as wings
 from airflock.parts.bodies import wind
 from airflock.parts.metrics import Parameters as MetricParameters, parameters as metric_parameters
-from airflock.parts.sensors import SENSORS
-from airflock.parts.topologies import TOPOLOGIES
 from airflock.scenarios.fault_entries import FaultEntry
 from airflock.scenarios.groups import FlownLaw, Group, agent_values, flown_laws, varied_numbers
 from airflock.scenarios.scenario_checks import largest_extension

@@ -11,16 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from airflock.core import Model, telling_digits
+from airflock.parts import SETS, TOPOLOGIES
 from airflock.scenarios import formats, schema, short_keys
 from airflock.scenarios.fault_entries import read_fault_entries
 from airflock.scenarios.flight_world import scene_errors, scene_notes
 from airflock.scenarios.groups import GroupLawReader, group_errors, group_number_errors, read_groups
 from airflock.scenarios.named_code import MODELS
 from airflock.scenarios.part_kinds import (
-    METRIC_SET_KIND,
     NO_CALLER_PARTS,
     PART_KINDS,
-    TOPOLOGY_KIND,
     CallerParts,
     ScenarioParts,
     collect_parts,
@@ -106,7 +105,7 @@ def build_scenario(
         raise ScenarioError([f"{where}: {error}" for error in errors])
     parts["scene"] = _find_mesh(parts["scene"], folder)
     rules = {"body": flown.body, "sensors": flown.sensors, "radio": flown.radio, "metrics": flown.metrics}
-    rules["topology"] = flown.topology or TOPOLOGY_KIND.shipped[parts["topology"].kind]
+    rules["topology"] = flown.topology or TOPOLOGIES[parts["topology"].kind]
     parts |= {section: Part(rule, parts[section]) for section, rule in rules.items()}
     scenario = Scenario(name=where, model=flown.law, published=published, document=whole, **parts, **individuals)
     # These checks need a whole scenario, so they come second and never beside errors of single
@@ -193,7 +192,7 @@ def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str,
     """Make the records of a scenario by section, None where one has an error; and all errors."""
     parts: dict[str, Any] = {}
     errors: list[str] = []
-    kinds = {family.section: family.records for family in PART_KINDS if family is not METRIC_SET_KIND}
+    kinds = {family.section: family.records for family in PART_KINDS if family is not SETS}
     for section, record in flown.records.items():
         given = document.get(section, {})
         if section in kinds and isinstance(given, Mapping) and not hasattr(record, "kind"):
@@ -219,7 +218,7 @@ def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: boo
         errors.append(f"agents = {telling_digits(flight.agents, lambda v: v != int(v))} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
     ours = parts["topology"] is not None and flown.topology is None
-    meets = TOPOLOGY_KIND.shipped[parts["topology"].kind] if ours else flown.topology
+    meets = TOPOLOGIES[parts["topology"].kind] if ours else flown.topology
     errors += topology_errors(meets, world, law)
     errors += field_file_errors(world)
     corners = 0 if world is None else len(world.corners) + sum(map(len, world.obstacles))
@@ -289,7 +288,7 @@ def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = 
         each.section: getattr(scenario, each.section).rule
         for each in PART_KINDS
         if f"{each.section}.kind" not in settings
-        and document.get(each.section, {}).get("kind", "") not in ("", *each.shipped)
+        and document.get(each.section, {}).get("kind", "") not in ("", *each)
     }
     kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
     # Files of faults were run when the scenario was loaded; here their kinds are passed by name and

@@ -3,7 +3,7 @@
 from typing import Any
 
 from airflock.core import CLOCKS, Metric, Quantity, declarations, telling_digits
-from airflock.parts.metrics import METRICS
+from airflock.parts import METRICS
 from airflock.scenarios.cost import cell_notes, metrics_use_cells, uses_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_checks import largest_extension, stall_errors, uses_lifting_line

@@ -12,7 +12,7 @@ from typing import Any
 
 from airflock.core import Declaration, declarations, expand_vectors, without_replaced
 from airflock.scenarios.groups import LETTERS
-from airflock.scenarios.part_kinds import PART_KINDS
+from airflock.scenarios.part_kinds import PART_KINDS, kept_keys, named_kind
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
 from airflock.support import ScenarioError, suggest, to_identifier
@@ -31,9 +31,10 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
         table, key = document.get(section, {}), f"{section}.kind"
         if key not in settings or not isinstance(table, Mapping):
             continue
-        kept = family.kept(table, str(settings[key]))
+        kept = kept_keys(family, table, str(settings[key]))
         if set(table) - {"kind", *kept}:
-            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {family.kind(document)} are left out")
+            before = named_kind(family, document)
+            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {before} are left out")
         document = {**document, section: kept}
     law = document.get("model", {})
     before = value_of(law.get("kind")) if isinstance(law, Mapping) else None

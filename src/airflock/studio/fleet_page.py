@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from airflock.drones import HEARD_WITHIN, MissionPhase, Peer
 from airflock.fleets import INJECTED_KINDS, SCENARIO_FAULT_NAMES, FleetObserver, is_on_ground
-from airflock.parts.faults import KINDS as OURS
+from airflock.parts import FAULTS as OURS
 from airflock.studio import page_measures as measures
 from airflock.studio.browser_view import BrowserView, Trails
 from airflock.studio.flight_pane import ABSENT_HEIGHT, ABSENT_SPACING

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airflock.core import AgentView as Seen, Model, argument_names
 from airflock.engine import DriverState as Memory
-from airflock.parts.faults import KINDS as KINDS_OF_FAULT
+from airflock.parts import FAULTS as KINDS_OF_FAULT
 from airflock.scenarios import (
     FIXED_KEYS,
     TOP_LEVEL_KEYS,

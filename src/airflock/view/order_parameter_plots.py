@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from airflock.core import Quantity, bell, declarations, peak, rising
-from airflock.parts.metrics import METRICS
+from airflock.parts import METRICS
 from airflock.recordings import measure_recording, over_time, recorded_faults, scenario_of_recording
 from airflock.scenarios import SECTIONS, Flight, Scenario
 from airflock.support import AirflockError, RecordingError

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from airflock.parts.metrics import fitness_dimock
+from airflock.parts.metric_sets import dimock as fitness_dimock
 from airflock.search import CMAES
 from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task
 from airflock_papers.dimock_2003.units import BEST, Gains, gains

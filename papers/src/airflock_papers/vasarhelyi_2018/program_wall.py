@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from airflock.core import FAR, bell
-from airflock.parts.metrics import Parameters, fitness_vasarhelyi
+from airflock.parts.metric_sets import vasarhelyi as fitness_vasarhelyi
+from airflock.parts.metrics import Parameters
 
 METRICS = ("speed", "correlation", "nearest", "collisions", "excursion")
 REPORTS = {

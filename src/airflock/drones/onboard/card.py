@@ -9,7 +9,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import import_module
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -23,12 +22,11 @@ from airflock.core import (
     SilenceParameters,
     State,
     choice,
-    model,
     quantity,
 )
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot, ParameterCheck
-from airflock.parts.bodies import BODIES
-from airflock.parts.topologies import TOPOLOGIES, parameters as topologies
+from airflock.parts import BODIES, LAWS, TOPOLOGIES
+from airflock.parts.topologies import parameters as topologies
 from airflock.support import (
     AirflockError,
     CardError,
@@ -297,12 +295,9 @@ def law_of_package(name: str) -> Model:
     """Return a law of the package by its name."""
     # A law is named, never carried as code: a card is data. Laws of a user's own fly from an
     # installed package.
-    if not name.isidentifier():
+    if name not in LAWS:
         raise CardError([f"law.kind = {name!r} is not a law of this version"])
-    try:
-        return model(import_module(f"airflock.parts.laws.{name}"))
-    except ModuleNotFoundError as error:
-        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from error
+    return LAWS[name]
 
 
 def read_law(table: Any, errors: list[str], section: str = "law") -> tuple[Model | None, Any]:

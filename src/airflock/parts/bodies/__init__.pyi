@@ -5,6 +5,5 @@ from . import (
     motion as motion,
     wind as wind,
 )
-from .body_kinds import BODIES as BODIES, default_body as default_body
 from .falling import fall as fall
 from .motion import Parameters as Parameters

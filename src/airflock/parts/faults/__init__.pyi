@@ -1,2 +1,1 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from .fault_kinds import KINDS as KINDS

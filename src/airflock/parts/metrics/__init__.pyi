@@ -1,15 +1,10 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
 from . import (
-    fitness_dimock as fitness_dimock,
-    fitness_vasarhelyi as fitness_vasarhelyi,
     nearest as nearest,
     parameters as parameters,
 )
 from .metric_sets import (
-    DEFAULT_SET as DEFAULT_SET,
-    METRICS as METRICS,
     POWER_SETTINGS as POWER_SETTINGS,
-    SETS as SETS,
     metric_set as metric_set,
     reported_values as reported_values,
     scalar_names as scalar_names,

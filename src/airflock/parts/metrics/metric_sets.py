@@ -5,35 +5,18 @@ from dataclasses import is_dataclass, make_dataclass
 from types import ModuleType
 from typing import Any
 
-from airflock.core import Metric, MetricSet, Parameters as Record, find_members, metric, namespace_names
-from airflock.parts.metrics import parameters, quality
+from airflock.core import Kind, Metric, MetricSet, Parameters as Record, metric, namespace_names
+from airflock.parts.metrics import parameters
 from airflock.support import RuleError
 
-METRICS: dict[str, Metric] = find_members("airflock.parts.metrics", ["sample"], metric)
+METRICS = Kind("airflock.parts.metrics", "metric", metric, Metric, ("sample",), check="check_metric")
 
 
-def _named(*names: str) -> tuple[Metric, ...]:
+def named(*names: str) -> tuple[Metric, ...]:
+    """Return metrics of the package by their names."""
     return tuple(METRICS[name] for name in names)
 
 
-def _counted(found: tuple[Metric, ...], q: Any) -> tuple[Metric, ...]:
-    """Metrics of a set whose collisions the key metrics.count counts: each agent, or as the authors' program does."""
-    return tuple(METRICS["marks"] if q.count == "program" and m.name == "quality" else m for m in found)
-
-
-QUALITY = _named("quality", "polarisation")
-GROUPS = (*QUALITY, *_named("groups", "shape"))
-
-
-def _quality(q: Any) -> tuple[Metric, ...]:
-    return _counted(QUALITY, q)
-
-
-def _groups(q: Any) -> tuple[Metric, ...]:
-    return _counted(GROUPS, q)
-
-
-DEFAULT_SET = "vasarhelyi"  # the set of a scenario without metrics.kind
 POWER_SETTINGS = {"metrics.kind": "dimock", "metrics.fitness": "sound"}  # settings that measure the power of wings
 
 # what the engine itself keeps of a flight with goals
@@ -91,7 +74,7 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
     record = _parameters(found.get("Parameters"), name)
     violates = dict(found.get("VIOLATES", {}))
     errors = found.get("errors", found.get("faults"))  # as it was called before
-    return MetricSet(name, tuple(metrics), record, None, fitness, reports, best, errors, violates)
+    return MetricSet(name, tuple(metrics), record, found.get("chosen"), fitness, reports, best, errors, violates)
 
 
 def to_metric_set(source: Any) -> MetricSet:
@@ -142,6 +125,10 @@ def scalar_names(metric_set_: MetricSet, q: Any, goals: bool = False) -> tuple[s
     return tuple(dict.fromkeys((*own, *metric_set_.reports)))
 
 
+SETS = Kind(
+    "airflock.parts.metric_sets", "set of order parameters", metric_set, MetricSet, ("METRICS",), "metrics",
+    "vasarhelyi", shared=None, take=to_metric_set, check="check_metric",
+)  # fmt: skip
 PRESENCE = {"present": ("", "share of all individuals and instants for which the recording has data")}
 
 
@@ -149,18 +136,3 @@ def reported_values(metric_set_: MetricSet) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every order parameter that flights scored by a set report."""
     own = {name: about for each in metric_set_.metrics for name, about in each.reports.items()}
     return own | dict(metric_set_.reports) | GOALS | PRESENCE
-
-
-SETS: dict[str, MetricSet] = {
-    **find_members("airflock.parts.metrics", ["fitness"], metric_set),
-    "zapotecatl": MetricSet(
-        "zapotecatl", QUALITY, parameters.Parameters, _quality, best="quality", errors=quality.errors
-    ),
-    "groups": MetricSet("groups", GROUPS, parameters.Parameters, _groups, best="quality", errors=quality.errors),
-    "contacts": MetricSet(
-        "contacts",
-        _named("speed", "polarisation", "nearest", "collisions", "contacts", "excursion"),
-        parameters.Parameters,
-    ),
-    "order": MetricSet("order", _named("speed", "polarisation", "milling", "shape"), parameters.Parameters),
-}

@@ -3,5 +3,4 @@ from . import (
     links as links,
     table as table,
 )
-from .radio_kinds import DEFAULT_RADIO as DEFAULT_RADIO, RADIOS as RADIOS
 from .table import ENTRIES as ENTRIES

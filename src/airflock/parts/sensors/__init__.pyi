@@ -1,3 +1,2 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
 from . import langevin as langevin
-from .sensor_kinds import DEFAULT_SENSOR as DEFAULT_SENSOR, SENSORS as SENSORS

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from airflock.core import Parameters as Record, choice, quantity
+from airflock.parts.kinds import TOPOLOGIES
 
 STARLINGS = "Ballerini et al. 2008: 6.5 ± 0.9 in flocks of starlings"
 
@@ -13,7 +14,7 @@ class Parameters(Record):
 
     kind: str = choice(
         "range",
-        ("range", "nearest", "voronoi", "visible", "strongest"),
+        tuple(TOPOLOGIES),
         source="our choice",
         meaning="range: all that the radio brings; nearest: the k nearest; voronoi: whose cell borders its own, "
         "in a plane; visible: not hidden by others, obstacles or the scene; strongest: the k strongest signals; "

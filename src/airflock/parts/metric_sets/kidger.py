@@ -13,7 +13,6 @@ from typing import Any
 
 from airflock.core import peak
 
-NAME = "kidger"
 METRICS = ["flocked", "swarms", "polarisation", "nearest", "collisions", "environment", "avoidance", "speed"]
 COLLISIONS = 3.0  # per agent and minute, at which f_coll is a quarter
 CRASHES = 0.1  # the same with the environment

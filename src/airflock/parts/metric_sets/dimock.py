@@ -10,7 +10,6 @@ from collections.abc import Mapping
 
 from airflock.parts.metrics.parameters import Parameters
 
-NAME = "dimock"
 METRICS = ["power", "steadiness", "collisions"]
 COLLIDED = -1000.0
 CLOSE = 10.0  # lone powers per unit of crowding: half of r_safe costs 2.5

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from airflock.core import bell, peak, rising
 from airflock.parts.metrics.parameters import Parameters
 
-NAME = "vasarhelyi"
 METRICS = ["speed", "correlation", "nearest", "collisions", "excursion", "rotation", "polarisation"]
 REPORTS = {
     "f_speed": ("", "partial fitness: speed"),

@@ -1,0 +1,5 @@
+# The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
+from . import (
+    dimock as dimock,
+    vasarhelyi as vasarhelyi,
+)
