@@ -51,8 +51,7 @@ from airflock.runs import (
 from airflock.scenarios import Scenario, formats, scenario_variant
 from airflock.support import ErrorCollector, ScenarioError, StudyError, expand_path, suggest
 
-# ---- Tolerance: how far each number of the environment may move until a limit can no longer be shown
-
+# A tolerance says how far a number of the environment may move until a limit can no longer be shown.
 # Every value that is tried flies the same seeds, so that values differ by nothing but themselves. A value is safe where
 # the upper bound falls below the limit. It is not shown where the bound does not fall below the limit within
 # MAX_FLIGHTS_FACTOR times the fewest flights that could show it, or where the lower bound exceeds the limit. Rare
@@ -277,9 +276,6 @@ def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dic
 
 
 COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take if tolerances are requested
-
-
-# ---- Certification
 
 
 def certify(

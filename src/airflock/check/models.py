@@ -200,9 +200,6 @@ def _pairs(law: TestedLaw, rng: np.random.Generator) -> str:
     return ""
 
 
-# ---------------------------------------------------------------------------------------------------------- flights
-
-
 def _flown(scenario: Scenario, start: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
     """Frames (time, component, agent) of a flight without a compiler."""
     flown = fly_world(scenario, seed, precision=64, record=True, start=start, device="python")

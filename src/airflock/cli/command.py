@@ -12,8 +12,6 @@ from typer.core import TyperCommand
 
 from airflock.support import INVALID, AirflockError, suggest
 
-# ---- Errors of a command line
-
 OUTPUT_OPTIONS = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
 SIMILARITY_CUTOFF = 0.75  # of options, as in `spelling.suggest`: both begin with --, and --budget is not --quiet
 SEED_OPTION = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
@@ -156,8 +154,6 @@ def _choices(parameter: Any) -> list[str]:
     kind = getattr(parameter, "type_descriptor", None) or getattr(parameter, "type", None)
     return [str(getattr(choice, "value", choice)) for choice in getattr(kind, "choices", None) or ()]
 
-
-# ---- Verbs
 
 ERRORS_KEY = "airflock.errors"  # of a command line, in the context of its verb
 VALUE_ERROR_NAMES = ("BadParameter", "MissingParameter")  # errors of one option alone

@@ -25,8 +25,6 @@ from airflock.support import (
     value_or_default,
 )
 
-# ---- fleet
-
 ALL_SYSTEM_IDS = tuple(range(1, 251))  # ids that drones may have
 
 
@@ -245,8 +243,6 @@ def _print_load(load: dict[str, Any] | None) -> None:
     )
 
 
-# ---- fly prepare
-
 DATAGRAM_BYTES = 95  # bytes of a signed status packet
 OVERHEAD_BYTES = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
 PREAMBLE_SECONDS = 2e-4  # s of a packet before its first bit; WiFi's long preamble
@@ -437,8 +433,6 @@ def _members(text: str) -> list[int]:
     return members
 
 
-# ---- fly order
-
 KILL_NOTE = "; the motors stop when kill --confirm follows within 5 s"
 
 
@@ -517,9 +511,6 @@ def _check_inside_fence(card: Any, option: tuple[float, float, float], point: st
     far = card.fence.outside(x, y)
     if far > 0.0:
         raise CardError([f"--point {point}: lies {far:.4g} m outside of the fence"])
-
-
-# ---- fly
 
 
 class FlyGroup(TyperGroup):

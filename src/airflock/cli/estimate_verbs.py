@@ -12,8 +12,6 @@ from airflock.cli import options, terminal
 from airflock.cli.terminal import counting_parts, progress_line
 from airflock.support import PICTURES, RECORDINGS, SCENARIOS, AirflockError, RecordingError, collect_errors
 
-# ---- import and export
-
 Files = Annotated[
     list[Path],
     typer.Argument(
@@ -191,9 +189,6 @@ def export(
     write(load_recording(recording), out, layout=layout.value)
     ned = "; x is north, as in PX4: airflock import --axes ned reads it" if layout is ExportLayout.PX4 else ""
     terminal.print_message(f"saved {out}{ned}")
-
-
-# ---- identify
 
 
 def identify(
@@ -405,8 +400,6 @@ def _identified_json(result: Any, check: Any) -> dict[str, Any]:
     card = [part._asdict() for part in flight_card(result.like)]
     return {"like": result.like.name, "numbers": numbers, "check": checks, "plan": card, "notes": result.notes}
 
-
-# ---- infer
 
 DEFAULT_LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
 Tracks = Annotated[

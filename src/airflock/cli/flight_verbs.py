@@ -26,8 +26,6 @@ from airflock.support import (
     value_or_default,
 )
 
-# ---- run and score
-
 ScoreValues = Mapping[str, Any]  # order parameters, or keys with their values, by name
 
 
@@ -285,8 +283,6 @@ def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> Non
             terminal.print_message(f"{each.path}: {note}")
 
 
-# ---- sweep
-
 MAX_GRID_POINTS = 100_000  # of one key, and points of a whole grid
 
 
@@ -439,9 +435,6 @@ def _print_sweep(tidy: Any, keys: list[str], show: str) -> None:
         cells = [str(row[key]) if isinstance(row[key], str) else f"{row[key]:g}" for key in keys]
         table.add_row(*cells, f"{row['mean']:.4g}{spread}", f"{row['median']:.4g}", str(row["count"]))
     Console().print(table)
-
-
-# ---- plot, video and replay
 
 
 class PictureKind(StrEnum):
@@ -598,9 +591,6 @@ def replay(
     terminal.print_message(f"saved {page} ({len(replay_page.text) / 1e6:.1f} MB)")
 
 
-# ---- display
-
-
 def display(
     shapes: Annotated[
         list[str],
@@ -670,9 +660,6 @@ def _print_display(rows: list[dict[str, Any]]) -> None:
     for row in rows:
         table.add_row(row["shape"], *(terminal.format_number(float(row[key])) for key in names))
     Console().print(table)
-
-
-# ---- watch
 
 
 def watch(

@@ -12,8 +12,6 @@ from airflock.support import AirflockError, as_error, collect_errors, printable,
 if TYPE_CHECKING:
     from airflock.scenarios import Key
 
-# ---- presets, validate and doctor
-
 
 def presets(
     name: Annotated[
@@ -140,9 +138,6 @@ def doctor(
         raise AirflockError(f"self-check {'; '.join(failed)}")
 
 
-# ---- keys
-
-
 def keys(
     section: Annotated[
         str | None,
@@ -186,9 +181,6 @@ def _print_keys(listed_keys: "list[Key]") -> None:
         source = f" ({key.source})" if key.source else ""
         console.print(line)
         console.print(Padding(Text.assemble(key.meaning, (source, "dim")), (0, 0, 0, 4)))
-
-
-# ---- types
 
 
 def types(

@@ -10,8 +10,6 @@ import typer
 from airflock.cli import options, terminal
 from airflock.support import AirflockError
 
-# ---- airflock.paper
-
 PACKAGE = "airflock_papers"  # imported when a paper is recomputed: Airflock flies without it
 
 
@@ -76,9 +74,6 @@ def require_papers() -> None:
         import_module(PACKAGE)
     except ModuleNotFoundError as error:
         raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from error
-
-
-# ---- airflock paper
 
 
 def paper_verb(

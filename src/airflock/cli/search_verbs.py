@@ -13,8 +13,6 @@ from airflock.cli import options, terminal
 from airflock.cli.terminal import counting_parts, progress_line, search_progress
 from airflock.support import INVALID, PICTURES, SCENARIOS, ScenarioError, invalid_if, value_or_default
 
-# ---- evolve
-
 
 def evolve(
     ctx: typer.Context,
@@ -181,8 +179,6 @@ def _print_optimum(result: Any) -> None:
     console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False, soft_wrap=True)
 
 
-# ---- harden
-
 NUMBER_WIDTH = 6  # columns that a number takes: a narrow terminal must not cut it off
 
 
@@ -285,9 +281,6 @@ def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
         (cost, least, most), (gain, low, high) = step.cost, step.gain
         costs = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"
         console.print(f"{step.name}: {step.verdict}; {costs}", highlight=False, markup=False, soft_wrap=True)
-
-
-# ---- tune
 
 
 def tune(
@@ -426,9 +419,6 @@ def _print_campaign(tuning: Any, shown: list[str]) -> None:
     line(f"saved {tuning.folder}: tuned.toml, certificate.toml, report.html, figures.pdf")
 
 
-# ---- Tables of a certificate
-
-
 def print_certificate(certificate: Any) -> None:
     """Print everything that a certificate shows, and what it does not show."""
     from rich.console import Console
@@ -536,8 +526,6 @@ def _map(console: Any, bounds: Any) -> None:
         table.add_row(f"{value:g}", *texts)
     console.print(table)
 
-
-# ---- certify
 
 ScenarioArgument = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")

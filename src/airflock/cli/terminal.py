@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any, Protocol
 
-# ---- Tables and JSON
-
 
 def column_statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return mean, standard deviation and median of each column; of a column of lists, those of each place.
@@ -126,8 +124,6 @@ def print_message(text: str) -> None:
     """Print a line for a person, on the error stream so that it never mixes with output."""
     sys.stderr.write(f"{text}\n")
 
-
-# ---- Progress
 
 FIRST_LINE_AFTER, LINE_INTERVAL = 10.0, 30.0  # s: before the first line of a log, and at least between two
 INTERVAL_SHARE = 0.1  # of the time so far that passes at least between two lines: a day gives some seventy

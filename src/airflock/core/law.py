@@ -13,8 +13,6 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from airflock.support import RuleError
 
-# ---- Rules as text: their syntax trees, the integers in them, and the fields of a record that they read.
-
 LEAVES = ast.Name, ast.Constant, ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop
 WORDS = {"ctx", "op", "ops", "id", "attr", "name", "asname", "module", "level", "names", "kind", "type_comment"}
 
@@ -50,7 +48,8 @@ KEEPING = {"min", "max", "abs"}  # integers of integers
 MAKING = {"int", "len"}
 
 
-# ---- The user's own rules as they are now: cells are run again, files are reloaded.
+# The user's own rules are taken as they are now, not as they were first read: cells of a notebook are run again,
+# files are reloaded.
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -300,9 +299,6 @@ HEAPED = ast.List, ast.Dict, ast.Set
 FORBIDDEN = (
     ast.Try, ast.With, ast.Raise, ast.Lambda, ast.ListComp, ast.DictComp, ast.SetComp, ast.GeneratorExp, ast.NamedExpr,
 )  # fmt: skip
-
-
-# ---- Errors in a rule
 
 
 def rule_errors(rule: Callable[..., Any]) -> list[str]:

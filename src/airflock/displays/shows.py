@@ -19,8 +19,7 @@ from airflock.recordings import recording_of as recorded
 from airflock.scenarios import Scenario, load
 from airflock.support import AirflockError, ScenarioError, SceneError, collect_errors, expand_path
 
-# ---- Shapes of a display: points at even distances from an image, a text or a mesh
-#
+# Shapes of a display are points at even distances from an image, a text or a mesh.
 # Images and texts face south and lean back, so that nobody flies right above somebody else, who might be struck if it
 # fell; what is dark or opaque is filled. Points lie at the centres of equal shares of the area (Lloyd 1982) or far from
 # each other on the surface of a mesh (farthest points first). The shape is as large as their distance requires, so that

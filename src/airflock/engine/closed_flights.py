@@ -32,8 +32,6 @@ from airflock.scenarios import (
 )
 from airflock.support import DeviceError, FlightError, available_cores, check_device, free_memory, run_in_threads
 
-# ---- Devices: `auto` picks by the size of the work and by what there is, and says what it picked
-
 MOST_TOGETHER = 20_000  # agents whose pairs one block of a GPU can look at in reasonable time
 WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
 # How much longer a block of a GPU takes for one flock than a core does, and how many flocks a

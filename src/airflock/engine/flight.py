@@ -150,8 +150,6 @@ class FlightState:
         """Return True if nothing more can be flown, not even the last sample."""
         return self.state.has_ended or self.step > self.steps
 
-    # ------------------------------------------------------------------------------------------------- flying
-
     def begin(self) -> None:
         """Place the agents, where that has not been done: the driver draws the start."""
         if not self.state.begun:
@@ -208,8 +206,6 @@ class FlightState:
         """Samples, (time, component, agent)."""
         shape = (0, 3 * self.state.plan.dimensions, self.state.agents)
         return np.concatenate([np.zeros(shape, self.state.tables.row.dtype), *self._frames])
-
-    # ----------------------------------------------------------------------------------------------- changing
 
     @property
     def waiting(self) -> bool:
@@ -307,8 +303,6 @@ class FlightState:
     def note(self, kind: str, /, **data: Any) -> None:
         """Write down what was done before the next step."""
         self.events.append(Event(self.step, kind, data))
-
-    # ---------------------------------------------------------------------------------------------- branching
 
     def snapshot(self) -> Snapshot:
         """The present moment."""

@@ -15,8 +15,6 @@ from airflock.scenarios import Scenario
 from airflock.support import CardError, FlightSite, ScenarioError
 from airflock.world import arena, inward_plane
 
-# ---- Parameters of single agents
-
 
 def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tuple[Any, Any]]:
     """Return the numbers of law and body of each of the first `count` agents.
@@ -51,8 +49,6 @@ def agent_sensors(scenario: Scenario, count: int, seed: int) -> list[Any]:
     own = [{name: column[agent] for name, column in columns.items()} for agent in range(count)]
     return [replace(scenario.sensors.numbers, **numbers) for numbers in own]
 
-
-# ---- Card document
 
 DEFAULT_HEIGHT = 20.0  # m; our choice: above trees and people, below most limits
 DEFAULT_FENCE_MARGIN = 30.0  # m; our choice: a flock turns some metres beyond the law's soft walls

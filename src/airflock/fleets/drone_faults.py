@@ -15,8 +15,6 @@ from airflock.core import Fault, State, call_rule
 from airflock.scenarios import Scenario, draw_onsets
 from airflock.support import ScenarioError, as_error, read_toml, suggest
 
-# ---- Injected faults
-
 WHOLE_FLIGHT_TEXT = "from the start of the flight on"
 INJECTED_KINDS = {
     "outage": "nobody hears these drones, and they hear nobody",
@@ -126,8 +124,6 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[InjectedFault], l
         wrong.append("begin is not before end")
     return ([] if wrong else [InjectedFault(str(kind), tuple(who), **numbers)]), wrong
 
-
-# ---- Faults of the scenario
 
 Velocity = tuple[float, float, float]
 

@@ -36,8 +36,6 @@ from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.parts import FAULTS as OURS
 from airflock.support import LinkError, printable
 
-# ---- Telemetry broadcast
-
 DEFAULT_WATCH_ADDRESS: tuple[str, int] = ("127.0.0.1", 14600)  # where who watches hears a fleet in software
 REPORT_PERIOD = 0.5  # s between two reports
 NEIGHBOUR_WITHIN = 1.0  # s; a neighbour whose last packet arrived longer ago is not heard
@@ -95,8 +93,6 @@ class TelemetryBroadcast:
         return [self._sign(each, utc) for each in reports]
 
 
-# ---- Observer
-
 LISTENER_ID = 0  # system id of who only listens
 MAX_NOTES = 200  # notes
 REPORT_LIFETIME = 2.0  # s; an older report no longer holds
@@ -140,8 +136,6 @@ class FleetObserver:
         self._silent: set[int] = set()
         self._text_pieces = {member: TextPieces() for member in card.members}
         self._last_order_time = 0  # when the last order was given, µs of Unix time
-
-    # ------------------------------------------------------------------------------------------------------ in
 
     def take(self, datagram: bytes, now: float) -> None:
         """Take a datagram that came by any radio."""
@@ -204,8 +198,6 @@ class FleetObserver:
 
     def _note(self, now: float, member: int, text: str) -> None:
         self.notes.append(ObserverNote(now, member, text))
-
-    # ----------------------------------------------------------------------------------------------------- out
 
     @property
     def peers(self) -> dict[int, Peer]:

@@ -35,8 +35,6 @@ from airflock.fleets.vehicle import GUIDED, MESSAGE_RATES, SoftwareVehicle
 from airflock.scenarios import Scenario
 from airflock.support import CardError, Geodetic
 
-# ---- Random numbers
-
 STEPS_PER_BLOCK = 256  # motion steps that are drawn together
 MEASUREMENTS_PER_BLOCK = 16  # measurements that are drawn together
 NormalTriple = tuple[float, float, float]
@@ -108,8 +106,6 @@ class SensorWords:
         a, b, c, d = self._tables[draw][measurement - self._first_measurement][drone]
         return a, b, c, d
 
-
-# ---- Start of a fleet
 
 # Time for satellites, parameters and clocks to be reported before anybody may start.
 SECONDS_BEFORE_START = 12.0  # s on the ground before a start is ordered
@@ -198,8 +194,6 @@ class OperatorStation:
         return self._sign(orders.order_message(given, self._private), self._last_order_time)
 
 
-# ---- Lock-step
-
 START_TIME = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
 UNREAD_MESSAGES = ("attitude", "home", "battery")  # messages that no node reads; in lock-step nobody else is there
 ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
@@ -286,8 +280,6 @@ class LockstepFleet:
                 early.autopilot(vehicle.state_frames(), -k * period)
                 for datagram in early.status_datagrams(-k * period):
                     self.channel.send(-k * period, who, self._faulty_nodes[who].falsified(datagram, -k * period))
-
-    # ------------------------------------------------------------------------------------------------------ flight
 
     @property
     def now(self) -> float:
@@ -376,8 +368,6 @@ class LockstepFleet:
             return
         for sensing, vehicle in zip(self._sensor_states, self.vehicles, strict=True):
             vehicle.error = sensing.measure(number, State(*vehicle.state), self.card.period)
-
-    # --------------------------------------------------------------------------------------------------- recording
 
     def _keep(self) -> None:
         both = enumerate(zip(self.vehicles, self.nodes, strict=True))

@@ -31,8 +31,6 @@ from airflock.drones import (
 from airflock.fleets.drone_faults import DroneFaults, InjectedFault
 from airflock.support import FlightSite
 
-# ---- Packet loss
-
 PERIODS_PER_BLOCK = 16  # periods of the radio that are drawn together
 
 
@@ -67,8 +65,6 @@ class PacketNumbers:
         tables: list[list[list[float]]] = table[:, : self._count].tolist()
         return tables
 
-
-# ---- Attackers
 
 SOFTWARE_KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
 WRONG_KEY = bytes(32)  # a key that no fleet has
@@ -109,8 +105,6 @@ def _status_and_stamp(genuine: bytes, site: FlightSite) -> tuple[DroneStatus, in
     assert status is not None, "what a node of this fleet sent"
     return status, STAMP_FORMAT.unpack(genuine[-12:-6] + b"\0\0")[0]
 
-
-# ---- Channel
 
 TIME_TOLERANCE = 1e-6  # s
 Position = tuple[float, float, float]
@@ -271,9 +265,6 @@ class RadioChannel:
                 bent[bit // 8] ^= 1 << bit % 8
                 return bytes(bent)
         return datagram
-
-
-# ---- Faulty nodes
 
 
 class FaultyNode:

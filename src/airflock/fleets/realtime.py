@@ -54,8 +54,6 @@ from airflock.fleets.vehicle import MESSAGE_MAKERS, MESSAGE_RATES
 from airflock.scenarios import Scenario
 from airflock.support import LinkError, ScenarioError
 
-# ---- Tasks
-
 LOCAL_HOST = "127.0.0.1"
 HOVER_SECONDS = 1.0  # s beyond the radio's delay for which all hover before the flight begins
 MIN_LOOK_PERIOD = 0.02  # s; least time between two looks of a vehicle at its ports
@@ -358,8 +356,6 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
     return TaskResult([], [], TickCounts(0, 0, 0.0), MissionPhase.DONE, time.process_time() - began)
 
 
-# ---- Flown fleet
-
 ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
 
 
@@ -451,8 +447,6 @@ def _has_dropped_out(vehicle: TaskResult, k: int) -> bool:
     """Return True if a vehicle has dropped out by period k."""
     return bool(math.isnan(vehicle.rows[k][0]))
 
-
-# ---- Supervision
 
 FLEET_MODES = ("lockstep", "tasks", "processes")
 DEFAULT_CLIENT = ("127.0.0.1", 14540)  # where PX4's simulator calls its first client

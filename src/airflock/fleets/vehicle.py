@@ -24,8 +24,6 @@ from airflock.drones import ARMED_FLAG, AUTOPILOTS, FramePacker, FrameStream, co
 from airflock.fleets.drone_faults import DroneFaults, InjectedFault, whole_flight_amount
 from airflock.support import FlightSite, RuleError, swap_enu_ned
 
-# ---- Modes and parameters
-
 GUIDED, LAND_MODE, RETURN_MODE, HOLD_MODE, TAKEOFF_MODE, PILOT_MODE = "OURS", "LAND", "RTL", "HOLD", "TAKEOFF", "PILOT"
 MODE_NUMBERS = {
     "px4": {GUIDED: px4_mode(6), LAND_MODE: px4_mode(4, 6), RETURN_MODE: px4_mode(4, 5), HOLD_MODE: px4_mode(4, 3),
@@ -47,8 +45,6 @@ LOST_STATION_MODES = {
 }  # FS_GCS_ENABLE of ArduPilot; all others return, by the way they came or straight
 LOW_BATTERY_MODES = {1: LAND_MODE, 2: RETURN_MODE}  # BATT_FS_LOW_ACT of ArduPilot; 0 (default) warns only
 
-
-# ---- Holding a position
 
 STANDING_SPEED = 0.5  # m/s; our choice: slower than this it has come to stand, and holds that place
 # PX4's position gain is about twice this (MPC_XY_P 0.95 1/s); without holding, drones that hover
@@ -84,8 +80,6 @@ class HoldPosition:
         )
         return vx, vy, up
 
-
-# ---- Telemetry
 
 MESSAGE_RATES = {
     "heartbeat": 2.0, "sys_status": 1.0, "system_time": 1.0, "gps": 5.0, "local": 20.0, "global": 20.0, "landed": 5.0,
@@ -209,8 +203,6 @@ MESSAGE_MAKERS: dict[str, Callable[[Any], Any]] = {
     "origin": _gps_origin, "version": _version, "prearm": lambda v: _text(v.prearm_error()),
 }  # fmt: skip
 
-
-# ---- Vehicle
 
 RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED, RESULT_FAILED = 0, 2, 3, 4
 POSITION_IGNORED_MASK = 0x0007
@@ -406,8 +398,6 @@ class SoftwareVehicle:
         # Measured: the first heartbeat after 1 s, the first PreArm text after 30 s.
         self.due = dict.fromkeys(self.rates, self.now + 1.0) | {"prearm": self.now + 30.0}
 
-    # -------------------------------------------------------------------------------------------------- frames in
-
     def receive(self, data: bytes, now: float) -> bytes:
         """Take bytes and return the answers."""
         self.now = now
@@ -563,8 +553,6 @@ class SoftwareVehicle:
         0: _heartbeat, 11: _set_mode, 20: _read, 21: _list, 23: _write, 75: _command, 76: _command, 84: _setpoint,
         111: _timesync,
     }  # fmt: skip
-
-    # ----------------------------------------------------------------------------------------------------- motion
 
     def apply_faults(self, now: float, dt: float) -> None:
         """Apply the injected faults of this vehicle to the step from now on."""

@@ -28,7 +28,7 @@ def step_counts(scenario: Scenario) -> dict[str, int]:
     }
 
 
-# --- Cells: neighbours are found in cells as wide as the reach of a law ---
+# Neighbours are found in cells as wide as the reach of a law.
 
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
 # Agents from which order parameters look at pairs by cells: below, all pairs in vectors are as
@@ -116,8 +116,6 @@ def metrics_use_cells(scenario: Scenario) -> bool:
     periodic = scenario.world.edges == "periodic"
     return bool(scenario.agents >= (NEAR_FROM_IN_A_BOX if periodic else NEAR_FROM))
 
-
-# --- Run time, in seconds of one core ---
 
 TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
 # Counted and not timed, as an answer is needed before anything is compiled. Shipped presets took

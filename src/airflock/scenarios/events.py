@@ -115,8 +115,6 @@ def _index(given: Any) -> int:
         return -1
 
 
-# --- Seeds ---
-
 LARGEST_SEED = 2**64 - 1
 MAX_FLIGHTS = 10_000_000  # flights at a time
 

@@ -212,8 +212,6 @@ def _end_errors(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> lis
     return errors
 
 
-# --- Onsets: when faults begin in one flight, and which agents they affect ---
-
 # Rates count for the flock and not for each agent: "a motor fails once an hour" is what people know
 # of a fleet.
 ENDLESS = 1e9  # s; how long a fault lasts that does not end

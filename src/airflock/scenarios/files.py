@@ -252,8 +252,6 @@ def scenario_variant(
     return rebuilt(scenario, settings) if settings else scenario
 
 
-# --- Files that extend another: extends = "vasarhelyi_2018/real_6ms" ---
-
 OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
 LONGEST = 10  # files in a chain of extends
 # sections in which another kind means other keys
@@ -345,8 +343,6 @@ def _kind_with_path(entry: Any, folder: Path) -> Any:
         return entry
     return {**entry, "kind": str((folder / name).absolute())}
 
-
-# --- Fields from a map file: the key world.file ---
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights", "latitude", "longitude")  # come from the map file

@@ -229,9 +229,6 @@ def _blocked_share(scene: scenery.Parameters, begin: start.Parameters, world: ar
     return shut / number
 
 
-# --- The world and the goals of an interpreted flight ---
-
-
 class FlightWorld(Map):
     """The world of a flight: the map of a drone, with edges that act and shapes that appear."""
 

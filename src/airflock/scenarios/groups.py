@@ -50,9 +50,6 @@ class Group:
         return replace(self, numbers=rest[0], spread=rest[1])
 
 
-# --- Laws of groups ---
-
-
 class FlownLaw(NamedTuple):
     """A law that agents of a flock fly by.
 
@@ -215,9 +212,6 @@ def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]
         if values - {usual} or any(group.spread.get(key, 0.0) > 0.0 for group in groups):
             names.append(key)
     return tuple(names)
-
-
-# --- Entries of [[groups]] ---
 
 
 def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:

@@ -191,8 +191,6 @@ def _declared(before: str, owner: str, record: type) -> list[Key]:
     return keys_of_record
 
 
-# --- Keys that no record declares ---
-
 OWN = "FILE.py"
 
 

@@ -66,9 +66,6 @@ def law_from_caller(law: Any) -> Model:
 T = TypeVar("T")
 
 
-# --- Python files of the user's own ---
-
-
 def load_user_module(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
     """Import a Python file that a key names, beside the scenario file or in the current folder.
 

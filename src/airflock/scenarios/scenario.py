@@ -355,8 +355,6 @@ class Scenario:
         return default_separation(self.model, self.parameters, self.start, self.world) if distance is None else distance
 
 
-# --- Display: one line, and a table for notebooks ---
-
 SHOWN = 8  # lists of points longer than this are counted, not printed
 
 
@@ -412,9 +410,6 @@ def scenario_html(scenario: Scenario) -> str:
     notes = "".join(f"<li>{escape(note)}</li>" for note in scenario.notes)
     keys = html_table(("changed key", "value", "meaning"), rows)
     return f"<p><b>{escape(summary(scenario))}</b></p>{keys}{f'<ul>{notes}</ul>' if notes else ''}"
-
-
-# --- Numbers that a scenario may leave open, derived from the rest of it ---
 
 
 def default_metrics(scenario: Scenario) -> MetricParameters:

@@ -131,8 +131,6 @@ def field_file_errors(world: Any) -> list[str]:
     return [f"world.file = {world.file!r}: a file is read where a scenario is loaded, and not here"]
 
 
-# --- Wings: stall, overlap at the start, and the gradient of the drag ---
-
 FormationPlace = Callable[[int, float, float, float], tuple[float, float, float]]
 FORMATIONS: dict[str, FormationPlace] = {"vee": start.in_vee, "echelon": start.in_echelon}  # by the key start.kind
 THIN = 0.1  # of a span: wings farther apart in height do not meet
@@ -200,8 +198,6 @@ def _overlapping(parts: Mapping[str, Any]) -> list[str]:
                 ]
     return []
 
-
-# --- The arena: simple polygons, containment, room for all agents ---
 
 MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
 ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: files round corners to the millimetre

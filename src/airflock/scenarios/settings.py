@@ -98,8 +98,6 @@ def with_vector_components(document: dict[str, Any], records: Mapping[str, type]
     return document, errors
 
 
-# --- Keys of groups: groups.NAME.SECTION.KEY ---
-
 GROUP_PREFIX, SPREAD = "groups.", "spread"
 GROUP_FORM = "write groups.NAME.SECTION.KEY, for instance groups.heavy.body.tau"
 
@@ -227,8 +225,6 @@ def group_key_value(scenario: Any, key: str) -> Any:
     record = owner.law[1] if owner.law and section == "model" else scenario.records[section]
     return owner.numbers.get((LETTERS[section], name), getattr(record, name))
 
-
-# --- Keys of faults: faults.KIND.KEY or faults.NUMBER.KEY ---
 
 FAULT_PREFIX = "faults."
 FAULT_FORM = "write faults.KIND.KEY or faults.NUMBER.KEY, for instance faults.motor.share"

@@ -170,8 +170,6 @@ def _short(value: Any) -> str:
     return f"{value:g}" if isinstance(value, (int, float)) else str(value)
 
 
-# --- Spreads: tolerances of manufacture, in the unit of a number or as a share of it ---
-
 OF_IT = "a share of the number such as '10 %'"
 
 

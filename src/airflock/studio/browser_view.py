@@ -18,8 +18,6 @@ from airflock.studio.flight_pane import ParameterControl
 from airflock.support import StudioError
 from airflock.view import SceneLines, SceneSolid, agent_colours, dart_mesh
 
-# ---- Charts
-
 ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)  # times a power of ten
 PARTS_PER_SPAN = 4  # an axis ends within a part, so large, of the span that is shown
 MIN_RELATIVE_SPAN = 1e-9  # a span below this share of its ends is none
@@ -87,8 +85,6 @@ class Chart:
         """Remove the chart from the page."""
         self._handle.remove()
 
-
-# ---- Panel
 
 CHART_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 
@@ -213,8 +209,6 @@ class Widgets:
             client.add_notification(title, body, color="red" if is_error else "blue", auto_close_seconds=8.0)
 
 
-# ---- Scene
-
 TRAIL_PIECES = 40  # nodes, rewritten in turn: a trail is so many frames long
 FLAT_FIELD_OF_VIEW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
 SPACE_FIELD_OF_VIEW = 0.8
@@ -275,8 +269,6 @@ class BrowserView:
     def stop(self) -> None:
         """Close the page at once."""
         self.server.stop()
-
-    # ------------------------------------------------------------------------------------------------ standing
 
     def clear(self, moving: bool = True) -> None:
         """Remove the scene, and the agents with all that is drawn about them."""
@@ -380,8 +372,6 @@ class BrowserView:
         return self.server.scene.add_line_segments(
             name, points.astype(np.float32), colour, thickness=width, thickness_units="screen"
         )
-
-    # ------------------------------------------------------------------------------------------------- moving
 
     def agents(self, count: int, size: float, lines: Mapping[str, tuple[Any, float]]) -> None:
         """Make so many darts of a size, m; their trails; and kinds of lines about them by name: colour and width."""
@@ -511,8 +501,6 @@ def camera_for_aspect(camera_aim: Mapping[str, Any], aspect: float) -> dict[str,
         "far": camera_aim["far"] / closer,
     }
 
-
-# ---- Trails
 
 FRAMES_PER_PIECE = 6  # frames of one piece
 Positions = NDArray[Any]

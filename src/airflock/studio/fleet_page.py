@@ -22,8 +22,6 @@ from airflock.studio.page_panels import small_print_html, status_html
 from airflock.studio.player import ActionQueue
 from airflock.view import AgentColours, agent_colours, card_scene, velocity_quaternions
 
-# ---- Tables
-
 MAX_NOTES = 14  # notes
 MAX_ROWS = 60  # drones that have a row of their own
 MIN_REFUSED = 10  # datagrams of other keys after which it is said that none fits
@@ -124,8 +122,6 @@ def fleet_warning(observer: FleetObserver, now: float) -> str:
         return "nothing has been heard yet" if now - observer.begun > HEARD_WITHIN else ""
     return "" if observer.heard(now) else "no drone is heard any more"
 
-
-# ---- Scene
 
 # phases in the air, in the order of their colours; on the ground a drone is grey
 AIR_PHASES = (
@@ -285,8 +281,6 @@ def _with_nan(values: list[int | None]) -> NDArray[np.float64]:
     return np.array([np.nan if value is None else value for value in values], float)
 
 
-# ---- Page
-
 FRAMES_PER_SECOND = 30  # per second
 CHARTS_PER_SECOND = 5  # per second
 
@@ -380,8 +374,6 @@ class FleetPage:
                 self._show_status(now)
                 self._measure(now)
 
-    # -------------------------------------------------------------------------------------------------- selecting
-
     def select(self, number: int | None) -> None:
         """Select a drone by its index among the members, or none."""
         self.chosen = number
@@ -397,8 +389,6 @@ class FleetPage:
         off = np.linalg.norm(away - np.maximum(away @ direction, 0.0)[:, None] * direction, axis=1)
         best = int(off.argmin())
         self.select(best if off[best] < 2.0 * self.scene.size else None)
-
-    # ---------------------------------------------------------------------------------------------------- telling
 
     def _show_status(self, now: float) -> None:
         card, observer = self.observer.card, self.observer

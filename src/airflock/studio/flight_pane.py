@@ -39,8 +39,6 @@ from airflock.scenarios import (
 )
 from airflock.support import FlightError, RecordingError, StudioError, run_in_background
 
-# ---- Source of a flight
-
 MAX_DURATION = 1e6  # s; an open page has no end of its own
 
 
@@ -115,9 +113,6 @@ def without_end(scenario: Scenario) -> Scenario:
     return replace(scenario, flight=replace(scenario.flight, duration=longest), document=document)
 
 
-# ---- Files written from the page
-
-
 def tuned_toml(
     source: str,
     settings: Mapping[str, Any],
@@ -189,8 +184,6 @@ def refly(flight: Flight) -> xr.Dataset:
         raise FlightError(f"{scenario.name}: flown again, the positions at t = {flight.time:g} s differ")
     return simulate(short, seed, precision=precision, start=start, events=events)
 
-
-# ---- Controls of parameters
 
 CONTROL_SECTIONS = ("model", "body", "sensors", "radio", "topology", "wind", "goals", "wing", "metrics")
 DEFAULT_SPAN_FACTOR = 4.0  # a slider ends at so many times the preset's value
@@ -316,8 +309,6 @@ def _hint_text(meaning: str, allowed: str, source: str) -> str:
     return "; ".join(part for part in (meaning, allowed and f"allowed {allowed}", source) if part)
 
 
-# ---- Pane
-
 ABSENT_HEIGHT, ABSENT_SPACING = -1e7, 1e4  # m; where agents that have left are shown: nowhere
 MAX_INTERPRETED_AGENTS = 400  # agents; of more, one interpreted step holds a page up
 
@@ -419,8 +410,6 @@ class FlightPane:
         parts = ["airflock watch", shlex.quote(where), law, trust, set_options(self.settings), f"--seed {seed}"]
         return " ".join(part for part in parts if part)
 
-    # ----------------------------------------------------------------------------------------------- flying
-
     def fly_to(self, time: float) -> None:
         """Fly to a time, s; a gust that ends on the way is ended there."""
         before = self.flight.time
@@ -480,8 +469,6 @@ class FlightPane:
         """Return True if a key belongs to a fault that was begun by hand."""
         return is_fault_key(key) and not has_fault(self.preset, key)
 
-    # ----------------------------------------------------------------------------------------------- tuning
-
     def change(self, settings: Mapping[str, Any]) -> None:
         """Set keys of the scenario from now on; what must be compiled comes into force when that is done."""
         # Faults begun by hand are not in the file, so their first values must be remembered for
@@ -515,8 +502,6 @@ class FlightPane:
         back = {"wind.east": wind.east, "wind.north": wind.north} if self._gust is None else self._gust[1]
         self.flight.change({"wind.east": wind.east + east, "wind.north": wind.north + north}, wait=False)
         self._gust, self._gust_end = (seconds, back), None
-
-    # -------------------------------------------------------------------------------------------------- acting
 
     def check_free(self, x: float, y: float, width: float, name: str = "") -> None:
         """Raise StudioError where an agent is inside a square around (x, y), m."""

@@ -11,8 +11,6 @@ from airflock.fleets import DEFAULT_WATCH_ADDRESS, FleetObserver
 from airflock.studio.player import FlightRequest, Player
 from airflock.support import CardError, StudioError, collect_errors, expand_path
 
-# ---- Flights
-
 
 def watch(
     scenario: str | os.PathLike[str],
@@ -98,8 +96,6 @@ def _check_unused(subject: str, options: Mapping[str, Any], needed: str) -> None
     if useless:
         raise StudioError(f"{subject}; {' and '.join(useless)} need{'s' * (len(useless) == 1)} {needed}")
 
-
-# ---- Fleets
 
 DEFAULT_RADIOS = (f"udp:{DEFAULT_WATCH_ADDRESS[0]}:{DEFAULT_WATCH_ADDRESS[1]}",)  # where fleets in software are heard
 

@@ -15,8 +15,6 @@ from airflock.engine import Flight
 from airflock.parts.metrics import reported_values
 from airflock.scenarios import Scenario
 
-# ---- Measures
-
 MAX_CHART_POINTS = 600  # points of a chart
 MAX_LINKS = 2500
 HISTOGRAM_BINS = 40  # of a histogram
@@ -188,8 +186,6 @@ def default_score(names: Mapping[str, Any], published: Mapping[str, Any]) -> str
             return name
     return next((name for name in names if name in published), next(iter(names), ""))
 
-
-# ---- Tables of scores and differences
 
 COLUMN_STYLE = "text-align:right;padding-left:0.8em"
 

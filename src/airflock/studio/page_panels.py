@@ -61,8 +61,6 @@ from airflock.view import agent_colours, arrow_lines, rays_and_command, term_nam
 if TYPE_CHECKING:
     from airflock.studio.flight_page import FlightPage
 
-# ---- Base of all panels
-
 
 class PagePanel:
     """One panel of a page.
@@ -95,8 +93,6 @@ def status_html(text: str, is_error: bool) -> str:
     look = f"padding:0 0.75em 0.6em;font-size:0.85em;color:{'#b00020' if is_error else '#555'}"
     return f"<div style='{look}'>{html.escape(text)}</div>" if text else ""
 
-
-# ---- Playback
 
 BACK_SECONDS = 10  # s; how far one press goes back
 SECONDS_BEFORE_COLLISION = 1.0  # s; a jump to a collision ends so long before it
@@ -238,8 +234,6 @@ class PlaybackPanel(PagePanel):
             self.listed.content = small_print_html(f"<b>Pairs that collided</b><br>{few}") if collisions else ""
 
 
-# ---- Actions
-
 GUST_SECONDS = 3.0  # s of a gust
 WIND_DIRECTIONS = {"east": 0.0, "north": 90.0, "west": 180.0, "south": 270.0}  # deg
 OBSTACLE_WIDTH = 6.0  # darts; of an obstacle
@@ -324,8 +318,6 @@ def has_goals(panes: Sequence[FlightPane]) -> bool:
     return any(side.scenario.goals.kind in ("points", "scene") for side in panes)
 
 
-# ---- Opening and saving
-
 NO_CHOICE_TEXT = "a preset …"
 
 
@@ -399,8 +391,6 @@ def read_scenario_text(name: str, content: bytes) -> str:
         raise StudioError(f"{name}: is not a scenario file; its name must end with .toml")
     return text
 
-
-# ---- Measurement: charts of order parameters, speeds and distances, histograms, scores
 
 BAND_NAMES = ("paper +", "paper −")
 
@@ -541,8 +531,6 @@ def _joined_outlines(outlines: list[Any]) -> tuple[Any, ...]:
     return both, *found
 
 
-# ---- Measurement: comparison of two flights
-
 NO_COMPARISON_TEXT = (
     "“Fork here” starts a second flight beside this one, from now on and with the same noise. The controls then act "
     "on B: they differ only in what you change."
@@ -603,8 +591,6 @@ class ComparisonPanel(PagePanel):
         scores = score_table_html([side.flight for side in sides], self.page.measurement.scores)
         self.text.content = small_print_html("<br>".join(names)) + same + scores
 
-
-# ---- Tuning: sliders and menus of every parameter of the active pane, undo, and files to save
 
 KEY_EXAMPLE = "radio.delay = 400 ms, or goals.points = [[0, 50, 0]]"
 RESTART_HINTS = {"agents": "“agents” under Play starts another flight", "dt": "write it into the scenario file"}
@@ -755,8 +741,6 @@ def file_stem(player: Player) -> str:
     """Return the stem of file names of the active pane."""
     return Path(player.side.origin.where).with_suffix("").name
 
-
-# ---- Selection: percepts of the clicked agent
 
 NO_LINES = np.zeros((0, 2, 3))
 WAKE_SPANS = 6.0  # spans of a wake that are drawn
@@ -970,8 +954,6 @@ def _drag_text(memory: Memory, agent: int) -> str:
         said += f", {100.0 * (drag / max(alone, 1e-9) - 1.0):+.0f} % of a lone bird's"
     return said
 
-
-# ---- Selection: panel, and a push
 
 AGENT_LINE_KINDS = tuple(kind for kind in agent_colours.LINE_STYLES if kind != "links")
 NOTHING_SELECTED_TEXT = small_print_html("click an agent, or press S")

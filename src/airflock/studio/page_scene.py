@@ -27,8 +27,6 @@ from airflock.view import (
     velocity_quaternions,
 )
 
-# ---- Collisions
-
 MAX_KEPT = 2000  # collisions that are remembered; of more the latest
 MAX_LISTED = 40  # that are listed: the latest
 BOTH_PANES = -1  # side of what happened before a fork: it belongs to both
@@ -107,8 +105,6 @@ class CollisionList:
         """Drop all: other flights."""
         self._last_seen, self._ongoing = {}, {}
 
-
-# ---- Colouring
 
 UPDATE_FRAMES = 6  # frames; what changes slowly is looked at so often
 MEASURED_COLOURINGS = {"nearest agent": "m", "position error": "m"}  # numbers of every flock, with their units
@@ -205,8 +201,6 @@ def joined_colours(parts: Sequence[AgentColours]) -> AgentColours:
     )  # fmt: skip
 
 
-# ---- Scene
-
 OPEN_WORLD_SECONDS = 8.0  # s; half of what is seen of an open world is at least the way flown in this time
 DARTS_PER_HALF_WIDTH = 20.0  # a dart of a flock of a hundred is so many times smaller than half the picture
 TWO_PANE_SHARE = 0.8  # of the half width of two sides must fit the height of a page, which is broader than high
@@ -274,8 +268,6 @@ class PageScene:
         self.collisions = CollisionList()
         self.draw_handles: Any = None  # draws handles on goals that can be dragged: (player, drawing) → None
         self.rebuild()
-
-    # ----------------------------------------------------------------------------------------------- what stands
 
     def rebuild(self) -> None:
         """Draw the worlds of all panes again, with their agents as they are."""
@@ -351,8 +343,6 @@ class PageScene:
         """Drop trails, and collisions that lie ahead: the flight is at another time."""
         self.trails.forget()
         self.collisions.go_back(self.player.time, len(self.player.sides))
-
-    # -------------------------------------------------------------------------------------------------- frames
 
     def frame(self, selected: int | None) -> None:
         """Draw the present moment; `chosen` counts through the agents of all sides."""

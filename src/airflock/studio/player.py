@@ -19,8 +19,6 @@ from airflock.studio.flight_pane import FlightPane, FlightSource, refly, tuned_t
 from airflock.support import AirflockError, StudioError, atomic, describe_error, os_error_message
 from airflock.view import replay
 
-# ---- Clock, requests and snapshots
-
 MAX_CATCH_UP = 0.25  # s of real time that are given up at most, rather than flown in one leap
 
 
@@ -120,9 +118,6 @@ class KeptSnapshots:
         if not self._kept:
             return None
         return self._kept[max(bisect_right(self._times, time + 1e-9) - 1, 0)]
-
-
-# ---- Compared flights
 
 
 @dataclass(frozen=True)
@@ -240,8 +235,6 @@ class ComparedFlights:
         """Return positions (agent, 3) in m and velocities (agent, 3) in m/s of the active pane."""
         return self.side.motion
 
-    # ---------------------------------------------------------------------------------------------- beginning
-
     def reset(self, seed: int | None = None, settings: Mapping[str, Any] | None = None) -> None:
         """Begin another flight: of the same or another seed, or with other keys, such as the number of agents.
 
@@ -271,8 +264,6 @@ class ComparedFlights:
             raise
         self.note = f"opened {name}"
 
-    # ---------------------------------------------------------------------------------------------- comparing
-
     def fork(self) -> None:
         """Fly a second flight beside this one from here on, with the same noise, and let the controls act on it.
 
@@ -288,8 +279,6 @@ class ComparedFlights:
         self.sources = [self.side.origin]
         self.sides, self.hand = [self.side], 0
         self.note = ""
-
-    # ------------------------------------------------------------------------------------------------- acting
 
     def change(self, key: str, value: Any) -> None:
         """Set a key of the scenario from now on; what must be compiled comes into force when that is done."""
@@ -322,8 +311,6 @@ class ComparedFlights:
         for side in self.sides:
             side.move_goal(number, position)
 
-    # ------------------------------------------------------------------------------------------------- saving
-
     @property
     def command(self) -> str:
         """Command that opens the present scenario again."""
@@ -347,8 +334,6 @@ class ComparedFlights:
         self.switch_to_compiled()
         return replay(refly(self.flight)).save(path)
 
-
-# ---- Player
 
 MAX_BUSY_SECONDS = 0.05  # s of real time flown at most before the page is answered again
 
@@ -398,8 +383,6 @@ class Player(ComparedFlights):
     def over(self) -> bool:
         """True once the longest time that a page flies has been reached."""
         return any(side.flight.over for side in self.sides)
-
-    # ------------------------------------------------------------------------------------------------ playing
 
     def ask(self, action: Callable[[], None]) -> None:
         """Queue an action for the next frame; from any thread."""
@@ -504,8 +487,6 @@ class Player(ComparedFlights):
         self.snapshots.forget_after(time + 1e-6)
         least = "; no earlier moment is kept" if self.time > time + 1e-6 and not failed else ""
         self.failure_message, self.note, self.is_paused = "", f"back at t = {self.time:g} s{least}", True
-
-    # ---------------------------------------------------------------------------------------------- comparing
 
     def fork(self) -> None:
         """Fly a second flight beside this one from here on; of two, moments of both together are given up."""

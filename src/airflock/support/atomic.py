@@ -127,8 +127,6 @@ def _umask() -> int:
     return mask
 
 
-# --- Suffixes of the files that are written ---
-
 PICTURES = (".png", ".pdf", ".svg")
 VIDEOS = (".mp4", ".gif")
 RECORDINGS = (".nc",)

@@ -114,8 +114,6 @@ class StudioError(AirflockError):
     """A page cannot be opened: its port is in use, or there is nothing to show."""
 
 
-# --- Collecting all errors of a request ---
-
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -182,9 +180,6 @@ class ErrorCollector:
             raise ScenarioError(self.errors)
 
 
-# --- Words for an error line ---
-
-
 def suggest(
     word: object, known: Iterable[str], fallback: str = "", *, lead: str = "", prefix: str = "", cutoff: float = 0.5
 ) -> str:
@@ -228,8 +223,6 @@ def to_identifier(text: str) -> str:
     name = re.sub(r"\W", "_", unicodedata.normalize("NFKC", text))
     return name if name.isidentifier() else f"_{name}"
 
-
-# --- Checks of single values ---
 
 DEVICES = ("auto", "cpu", "cuda", "python")
 

@@ -16,8 +16,6 @@ from scipy.spatial import cKDTree
 from airflock.core import Quantity, declarations
 from airflock.scenarios import LETTERS, Scenario
 
-# ---- Colour maps
-
 # viridis of matplotlib (van der Walt and Smith 2015, CC0), nine of its colours, without the yellow
 # end
 RAMP_STOPS = np.array(
@@ -64,8 +62,6 @@ def _interpolated(table: NDArray[Any], position: NDArray[Any]) -> NDArray[np.uin
     return np.asarray(np.round(table[first] * (1.0 - part) + table[first + 1] * part), np.uint8)
 
 
-# ---- Clusters
-
 FIRST_LINKS = 9  # nearest agents that are linked first: in a dense flock they join nearly everybody
 
 
@@ -110,8 +106,6 @@ def cluster_distance(scenario: Any) -> float:
     """
     return float(scenario.resolved_metrics().r_cluster or math.nan)
 
-
-# ---- Colourings of agents
 
 NUMBERS, HEADING, CATEGORIES, IDENTITIES = "scale", "turn", "names", "marks"
 MOTION_COLOURINGS = ("speed", "heading", "height")  # from the motion alone

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from airflock.core import BoundPercept, HeardNeighbour, Model, State, decide
 from airflock.scenarios import FlightWorld, GoalCourse, Scenario, step_counts
 
-# ---- Vectors of a law
-
 
 def vector_fields(record: Any) -> dict[str, tuple[str, str]]:
     """Find the vectors among the fields of a NamedTuple: name → fields of its x and y component.
@@ -49,9 +47,6 @@ def arrow_lines(begin: NDArray[Any], end: NDArray[Any]) -> NDArray[np.float64]:
     across = side / max(float(np.linalg.norm(side)), 1e-9) * length
     barbs = [end - 0.25 * along + sign * 0.12 * across for sign in (-1.0, 1.0)]
     return np.array([[begin, end], [barbs[0], end], [barbs[1], end]], float)
-
-
-# ---- Rays of a law
 
 
 class CastRay(NamedTuple):

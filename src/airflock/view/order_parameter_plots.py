@@ -18,8 +18,6 @@ from airflock.support import AirflockError, RecordingError
 from airflock.view import style
 from airflock.view.flight_paths import scenario_or_none, short_name, time_window, title_details
 
-# ---- Time series
-
 CORRELATION_LABEL, VELOCITY_LABEL, ROTATION_LABEL = (
     r"$\phi^{\mathrm{corr}}$",
     r"$\phi^{\mathrm{vel}}/v^{\mathrm{flock}}$",
@@ -204,8 +202,6 @@ def _in_window(course: pd.DataFrame, start: float | None, stop: float | None) ->
     return course.loc[begin - 1e-9 : end + 1e-9]
 
 
-# ---- Flocked time
-
 LINEAR_LIMIT = 10.0  # sub-swarms or collisions up to which their axis is linear
 
 
@@ -265,8 +261,6 @@ def flocked(
     style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
     return style.root_figure(figure)
 
-
-# ---- Heatmap of a sweep
 
 METRIC_UNITS = {name: unit or "1" for metric in METRICS.values() for name, (unit, _) in metric.reports.items()}
 MAX_WRITTEN_CELLS = 120  # cells; in a larger map the numbers would not be legible
@@ -404,9 +398,6 @@ def _cell_edges(axes: Axes, axis: str, levels: list[Any]) -> Any:
         return np.array([-0.5, 0.5])
     middle = 0.5 * (places[1:] + places[:-1])
     return np.concatenate([[2.0 * places[0] - middle[0]], middle, [2.0 * places[-1] - middle[-1]]])
-
-
-# ---- Transfer of direction
 
 
 def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Figure:

@@ -46,8 +46,6 @@ from airflock.view.agent_colours import (
 )
 from airflock.world import BOX, CYLINDER, SEGMENT, TRIANGLE, arena, half_sizes, heights_of
 
-# ---- Scene of a scenario as triangles and lines for any renderer
-
 BLOCK_COLOUR = (176, 182, 190)
 TREE_COLOUR = (110, 150, 110)
 OBSTACLE_COLOUR = (213, 94, 0)
@@ -234,8 +232,6 @@ def velocity_quaternions(velocity: NDArray[Any]) -> NDArray[Any]:
     return np.stack([cy * cp, -sy * sp, cy * sp, sy * cp], 1).astype(np.float32)
 
 
-# ---- Scene of a flight card
-
 FENCE_COLOUR = (204, 121, 167)
 
 
@@ -262,8 +258,6 @@ def card_scene(card: FlightCard) -> SceneGeometry:
     middle = np.array([*ends.mean(axis=0), 0.5 * card.height])
     return SceneGeometry(solids, lines, 0.55 * float(np.ptp(ends, axis=0).max()), middle, (0.0, card.high))
 
-
-# ---- Packed positions
 
 MAX_QUANTA = 65535  # of 16 bits
 
@@ -315,8 +309,6 @@ def unpack_positions(packed: PackedPositions) -> tuple[NDArray[np.float64], list
     rows = [np.add.accumulate(row, axis=1, dtype=np.uint8).T for row in rest]
     return np.asarray(scaled.transpose(2, 0, 1)), rows
 
-
-# ---- Colour layers
 
 NO_VALUE = 255  # no value
 MAX_CLUSTERED_POSITIONS = 1e6  # positions of which clusters are looked for; of more every so many frames
@@ -426,8 +418,6 @@ def _to_layer(shade: AgentColours, values: NDArray[Any]) -> ColourLayer:
     bytes_ = np.where(known & ((part < NO_VALUE) | (shade.kind != CATEGORIES)), np.round(part), NO_VALUE)
     return ColourLayer(shade._replace(values=np.zeros(0)), bytes_.astype(np.uint8))
 
-
-# ---- Page
 
 MAX_RATE = 10.0  # frames per second that are kept at most; the page draws between them
 MAX_EVENTS = 500

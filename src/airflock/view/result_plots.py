@@ -22,8 +22,6 @@ from airflock.view.flight_paths import scenario_or_none, short_name, title_detai
 if TYPE_CHECKING:
     from airflock.certificates import Certificate
 
-# ---- Certificate
-
 
 def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> Figure:
     """Plot upper bounds by flights, smallest distances, tolerances of the environment, and a map of two numbers.
@@ -177,8 +175,6 @@ def _bound_map(axes: Axes, certificate: "Certificate") -> None:
     assert figure is not None
     style.add_colour_bar(figure, shown, axes, "flights with an event, at most")
 
-
-# ---- Identified body
 
 MAX_SECONDS = 20.0  # s of one drone in the first panel
 MAX_POINTS = 4000  # points in the second
@@ -374,8 +370,6 @@ def _order(panel: Axes, check: LogCheck | None) -> None:
     style.add_legend(panel)
 
 
-# ---- Inferred law
-
 MAX_LAWS = 5  # laws that are drawn
 
 
@@ -412,8 +406,6 @@ def plot_inferred(result: InferResult, *, ax: Axes | None = None) -> Figure:
     style.set_figure_title(figure, "inferred", result.verdict)
     return style.root_figure(figure)
 
-
-# ---- Reception of the radio
 
 MIN_PAIRS = 10  # pairs of a bin below which it is not drawn
 
@@ -462,9 +454,6 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
     else:
         style.set_figure_title(figure, "reception", f"{len(heard)} rows, {heard['receiver'].nunique()} receivers")
     return style.root_figure(figure)
-
-
-# ---- Display
 
 
 def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:

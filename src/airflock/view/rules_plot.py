@@ -37,8 +37,6 @@ from airflock.view.flight_paths import paths_in_window, scenario_or_none, short_
 from airflock.view.law_vectors import term_name_and_unit, vector_fields
 from airflock.view.style import check_positive
 
-# ---- Responses of a law
-
 Array = NDArray[Any]
 MAX_DIFFERENCE = 1e3  # m/s; a larger allowed difference is drawn as none
 
@@ -134,8 +132,6 @@ def wall_curve(model: Model, p: Any, distance: Array, v: float) -> list[RuleResp
         for name, (x, _) in vector_fields(model.Walls).items()
     ]
 
-
-# ---- Plot of the rules
 
 CURVE_POINTS = 400
 DIFFERENCE_SHARES = (0.5, 1.0, 2.0)  # of the velocity difference, in the panel of alignment
@@ -275,8 +271,6 @@ def _wall_panel(axes: Axes, *, model: Model, p: Any, r: Array, v: float, unit: s
 def _curve_label(label: str, name: str) -> str:
     return f"{label}, {name}" if name else label
 
-
-# ---- Plot of a formation's wash from above, and of each bird's induced drag
 
 SPANS_BESIDE, SPANS_AHEAD, SPANS_BEHIND = 1.5, 1.0, 5.0  # spans of air shown around the birds
 FIELD_POINTS = 260  # of the field along its longer side

@@ -11,8 +11,6 @@ from matplotlib.ticker import MaxNLocator
 
 from airflock.view import style
 
-# ---- Convergence
-
 
 def convergence(
     table: pd.DataFrame, objective: str, *, maximise: bool = True, what: str = "", ax: Axes | None = None
@@ -47,8 +45,6 @@ def convergence(
     style.set_title(axes, what or "Convergence", f"{len(table)} candidates")
     return figure
 
-
-# ---- Fitness of all candidates
 
 PANEL_COLUMNS = 4
 
@@ -100,8 +96,6 @@ def fitness_scatter(
     style.set_figure_title(figure, what or "Fitness against parameters", f"{len(table)} candidates; line: chosen")
     return style.root_figure(figure)
 
-
-# ---- Slices through the parameters
 
 CELLS_PER_AXIS = 14
 
@@ -178,9 +172,6 @@ def _best_in_cells(
     cells = np.full((CELLS_PER_AXIS, CELLS_PER_AXIS), -np.inf)
     np.maximum.at(cells, (index[1], index[0]), sign * values)
     return np.ma.masked_invalid(np.where(np.isfinite(cells), sign * cells, np.nan))
-
-
-# ---- Pareto front
 
 
 def pareto(

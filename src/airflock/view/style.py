@@ -25,8 +25,6 @@ from matplotlib.text import Annotation
 from airflock.support import PICTURES, AirflockError, RecordingError, atomic_path, expand_path, suffix_error
 from airflock.view.agent_colours import WHEEL_STOPS
 
-# ---- Look of a figure
-
 # Okabe & Ito, "Color universal design" (2008)
 BLUE, GREEN, RED, ORANGE, SKY, PURPLE = "#0072B2", "#009E73", "#D55E00", "#E69F00", "#56B4E9", "#CC79A7"
 INK, GREY, PALE_GREY = "#222222", "#666666", "#D9D9D9"
@@ -190,8 +188,6 @@ def add_colour_bar(
     bar.outline.set_visible(False)
     return bar
 
-
-# ---- Files of figures
 
 # no dates: the same figure gives the same file
 UNDATED_METADATA: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}

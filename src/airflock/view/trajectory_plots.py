@@ -34,8 +34,6 @@ from airflock.view.flight_paths import (  # fmt: skip
 from airflock.view.law_vectors import CastRay, rays_and_command
 from airflock.world import BOX, CYLINDER, SEGMENT, TRIANGLE, arena
 
-# ---- Paths among buildings
-
 SCENERY_MARGIN = 40.0  # m of scenery shown around the paths
 MAX_SHAPES = 4000  # shapes drawn in space
 VIEW_ELEVATION_DEG = 42.0  # deg; from which a city is seen
@@ -243,8 +241,6 @@ def _paths(axes: Any, paths: FlightPaths, scale: Normalize) -> None:
     look: dict[str, Any] = {"s": 14.0, "color": style.INK, "edgecolors": "white", "linewidths": 0.4}
     axes.scatter(*paths.position[-1, :2], zorder=5, label="at the end", **look)
 
-
-# ---- Paths in the plane
 
 MAX_SECONDS = 60.0  # s; longer paths cover each other
 MAX_SEGMENTS = 200_000  # segments; beyond, frames are skipped so that a picture stays quick to draw
@@ -477,9 +473,6 @@ def _sparse_locator() -> Any:
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(4)
-
-
-# ---- Rays of one agent
 
 
 def rays_at_frame(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[CastRay], tuple[float, float, float]]:

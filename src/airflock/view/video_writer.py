@@ -44,8 +44,6 @@ from airflock.view.trajectory_plots import (
 )
 from airflock.world import half_sizes
 
-# ---- Frames
-
 Array = NDArray[Any]
 POINTS_PER_TAIL = 9
 DPI_PER_PIXEL = 100.0 / 720.0  # dots per inch and pixel of height: text grows with the picture
@@ -256,8 +254,6 @@ def to_even(pixels: float) -> int:
     """Return the nearest even number of pixels, which encoders need."""
     return 2 * max(16, round(pixels / 2.0))
 
-
-# ---- Video file
 
 # GIF: a palette for each frame, because one for all would need all frames in memory
 GIF_PALETTE_FILTER = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"

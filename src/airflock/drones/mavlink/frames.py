@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 
 from airflock.support import LinkError
 
-# ---- Message layouts of the dialect
-
 
 @cache
 def common_dialect() -> Any:
@@ -95,8 +93,6 @@ def checksum(data: bytes, crc_extra: int) -> int:
     accumulator.accumulate(bytes((crc_extra,)))
     return int(accumulator.crc)
 
-
-# ---- Frames
 
 FRAME_MAGIC = 0xFD
 HEADER_LENGTH = 10

@@ -20,8 +20,6 @@ from typing import Any, NamedTuple
 from airflock.drones.mavlink.frames import common_dialect, message_fields
 from airflock.support import FlightSite, swap_enu_ned
 
-# ---- Status packets
-
 STATUS_MESSAGE = 340  # UTM_GLOBAL_POSITION
 STATUS_VERSION = 2  # version 1 had no parts of whole numbers
 EXTRA_FORMAT = struct.Struct("<BBI4sBBB5b")
@@ -127,8 +125,6 @@ def _clip(value: float, low: int, high: int) -> int:
     return min(max(round(value), low), high)
 
 
-# ---- Lines for a person
-
 TEXT_MESSAGE = 253  # STATUSTEXT
 TEXT_LENGTH = 50  # letters of one message
 NOTICE = 5  # MAV_SEVERITY
@@ -164,8 +160,6 @@ class TextPieces:
         is_repeated, self._last = (number, text) == self._last, (number, text)
         return None if is_repeated else text
 
-
-# ---- Channel reports
 
 TUNNEL_MESSAGE = 385  # TUNNEL
 CHANNEL_SYSTEM = 254  # system id; below the operator's, above all drones

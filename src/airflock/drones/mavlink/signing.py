@@ -27,8 +27,6 @@ from airflock.drones.mavlink.frames import (
 )
 from airflock.support import LinkError, os_error_message
 
-# ---- Key files
-
 KEY_LENGTH = 32  # bytes
 
 
@@ -64,8 +62,6 @@ def read_key(path: Path) -> bytes:
         raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits")
     return key
 
-
-# ---- Signatures
 
 SIGNING_EPOCH = 1_420_070_400_000_000  # 2015-01-01 in µs of Unix time
 STAMPS_PER_SECOND = 100_000

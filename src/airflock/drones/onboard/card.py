@@ -51,8 +51,6 @@ from airflock.world import (
     polygon_error,
 )
 
-# ---- Fields of a document
-
 
 def read_record(record_class: Any, table: Any, section: str, errors: list[str]) -> Any:
     """Read a record of parameters from a table; add its errors to the list."""
@@ -139,8 +137,6 @@ def read_public_key(text: Any, errors: list[str]) -> bytes:
         errors.append("operator: is not a public key of 64 hexadecimal digits")
     return key
 
-
-# ---- Safety limits
 
 OWN_CHOICE = "our choice"
 
@@ -247,8 +243,6 @@ class SafetyLimits(Record):
     tick: float = quantity(0.05, "s", low=0.01, high=0.2, source=OWN_CHOICE, meaning="between setpoints")
 
 
-# ---- Fence
-
 FenceSide = tuple[float, float, float, float]
 
 
@@ -285,8 +279,6 @@ class Fence:
             return -min([a * x + b * y + d for a, b, _, d in self.convex_planes])
         return float(polygon.obstacle(x, y, 0.0, self.edges, 0, len(self.edges)).distance)
 
-
-# ---- Law, body and their numbers
 
 MEMBER_PARTS = ("law", "body")  # of which members may have numbers of their own
 
@@ -357,8 +349,6 @@ def wall_reach(law: Model, p: Any) -> float:
     """Return the distance (m) up to which a law with these numbers perceives walls and obstacles."""
     return FAR if law.wall_reach is None else float(law.wall_reach(p))
 
-
-# ---- Card
 
 CARD_VERSION = 2  # a card of version 1 does not name its rule of silence
 CARD_KEYS = (

@@ -27,8 +27,6 @@ from airflock.drones.onboard.peers import ORDER_REFUSALS, AutopilotLink, Operato
 from airflock.drones.onboard.situation import ConditionTimers, NodeTick, mission_facts
 from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseVelocity, SteeringInput, Velocity
 
-# ---- Outgoing messages
-
 ORIGIN_MESSAGE = 49
 POSITION_MESSAGES = (32, 33)
 UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, the largest value of a packet
@@ -65,8 +63,6 @@ def own_status(
         peers=peers,
     )
 
-
-# ---- Node
 
 QUANTITY = re.compile(r"[-+]?\d+(\.\d+)? (?=Hz|m|km|s|V|%)")
 RETRY_PERIOD = 1.0  # s between two tries of a command
@@ -146,8 +142,6 @@ class Node:
         self._line_number = 0
         self._phase_velocity = PhaseVelocity(card, self.pilot, now, self._notes)
 
-    # ------------------------------------------------------------------------------------------------------ in
-
     def utc(self, now: float) -> int:
         """Return the Unix time (µs) at a time of the own clock (s)."""
         return self._clock_zero + round(now * 1e6)
@@ -223,8 +217,6 @@ class Node:
         return (
             self._receiver.refused | self.peers.refused | {f"order: {k}": n for k, n in self.operator.refused.items()}
         )
-
-    # ----------------------------------------------------------------------------------------------------- out
 
     def tick(self, now: float) -> NodeOutput:
         """Decide by the mission table, and return what is to be sent; call it every `safety.tick` seconds."""
@@ -370,8 +362,6 @@ class Node:
             self._notes += [f"missing: {line}" for line in missing if QUANTITY.sub("", line) not in reported]
             self._reported_missing = missing
 
-    # ------------------------------------------------------------------------------------------------- steering
-
     def _steer(self, now: float, mission_facts: MissionFacts, out: NodeOutput) -> None:
         """Send the autopilot the setpoint or the mode of the phase, or nothing."""
         phase, say = self.phase, self._speaker
@@ -432,8 +422,6 @@ class Node:
             return False
         self._command_at = now
         return True
-
-    # ------------------------------------------------------------------------------------------------- speaking
 
     def _speak(self, now: float, mission_facts: MissionFacts, out: NodeOutput) -> None:
         """Send heartbeat, requests to the autopilot, and the own status on every radio that is due."""

@@ -21,8 +21,6 @@ from airflock.drones.onboard.flight_log import LoggingNode, memory_json, read_no
 from airflock.drones.onboard.node import Node, NodeOutput
 from airflock.support import AirflockError, CardError, LinkError, atomic, collect_errors
 
-# ---- Ports
-
 termios: Any
 try:
     import termios
@@ -212,8 +210,6 @@ class SerialPort:
         os.close(self._file)
 
 
-# ---- Tasks and their rests
-
 Result = TypeVar("Result")
 DataHandler = Callable[[bytes, float], None]  # takes bytes, and when they were read, s
 
@@ -264,8 +260,6 @@ def run_alone(task: Generator[TaskRest, None, Result]) -> Result:
             if time.monotonic() >= rest.until:
                 break
 
-
-# ---- Program
 
 COMMAND_HELP = (
     "Fly one member of a flock: this computer beside its autopilot. Nothing arms before the operator orders it."

@@ -18,8 +18,6 @@ from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import AIRBORNE_PHASES, FLOCKING_PHASES, MissionPhase
 from airflock.support import FlightSite, LinkError, printable, swap_enu_ned
 
-# ---- Peers
-
 HEARD_WITHIN = 2.0  # s; a peer whose last status is younger is heard
 AGE_COUNT = 10  # packets whose ages reveal a wrong clock
 # s beyond the radio's delay; a member whose packets are all older seems to have a clock that is
@@ -133,8 +131,6 @@ class Peers:
         return wrong >= 2
 
 
-# ---- Operator
-
 KILL_CONFIRM_WITHIN = 5_000_000  # µs; a kill must be confirmed within
 MAX_ORDER_AGE = 5_000_000  # µs; an order given longer ago is not obeyed
 # µs after its turn a drone may still start; our choice: later somebody may stand beside it.
@@ -231,8 +227,6 @@ class OperatorOrders:
         self.start_at = None
         return True
 
-
-# ---- Autopilot
 
 AUTOPILOT_COMPONENT = 1  # component id
 MAX_DISTANCE = 1e5  # m from the site; and m/s: nothing that flies here is there

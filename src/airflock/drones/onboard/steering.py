@@ -11,8 +11,6 @@ from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.situation import STANDING_SPEED
 from airflock.support import AirflockError
 
-# ---- Limiter
-
 Velocity = tuple[float, float, float]
 NO_VELOCITY: Velocity = (0.0, 0.0, 0.0)
 
@@ -78,8 +76,6 @@ def limit_velocity(
     return LimitedVelocity((k * vx, k * vy, clamp(vz, -safety.climb_max, safety.climb_max)), fenced)
 
 
-# ---- Guidance
-
 HEIGHT_GAIN = 1.0  # 1/s; our choice: a metre off is a metre per second
 KEEP_GAIN = 0.5  # 1/s; and half as fast back to a point that is kept
 PASSING_SHARE = 0.8  # of the distance of two layers: farther above each other, two drones pass
@@ -134,8 +130,6 @@ def velocity_home(
     px, py, _ = velocity_from_neighbours(own, neighbours, safety)
     return gx + px, gy + py, climb_rate(own, home[2], safety)
 
-
-# ---- Response of the drone
 
 RESPONSE_TIME = 10.0  # s; our choice: over which own velocities are compared with those that the card promises
 MIN_RESPONSE_ERROR = 0.3  # m/s; our choice: below it nothing was commanded that would tell
@@ -207,8 +201,6 @@ class ResponseWatch:
             "to stop are too short: prepare a card of its response, or raise its limits"
         )
 
-
-# ---- Velocity of each phase
 
 TIME_TOLERANCE = 1e-6  # s; two clocks of a lock-step meet within it
 Position = tuple[float, float, float]

@@ -28,8 +28,6 @@ from airflock.engine.stages.words import REDUCTION_START, ZERO
 from airflock.engine.tables import WorldTables
 from airflock.scenarios import FORMATIONS
 
-# ---------------------------------------------------------------------------------------- the start
-
 
 def table_widths(build: CudaBuilder) -> dict[str, int]:
     """Shared tables and their widths: whole vectors of two or four numbers."""
@@ -128,9 +126,6 @@ def _ring_at_start(build: CudaBuilder) -> list[str]:
     """What is heard, and what bodies follow, before anything was sent or decided."""
     stages = ["snapshot"] * build.plan.late + ["first_command"] * build.plan.lags
     return [line for name in stages for line in loop_lines("slot in range(slots)", [build.stages[name].call()])]
-
-
-# ------------------------------------------------------------------------------ what a thread holds
 
 
 def memory_lines(build: CudaBuilder) -> list[str]:
@@ -253,9 +248,6 @@ def _first_value(build: CudaBuilder, name: str) -> str:
     return f"real({starts[int(kept[2])]})"
 
 
-# -------------------------------------------------------------- faults, and agents that come and go
-
-
 STEP, KIND, AGENT, LEAVES = range(4)  # columns of the table of whole numbers; that of reals: how long, then numbers
 
 
@@ -376,9 +368,6 @@ def _shifted(table: str, rows: str, place: str) -> list[str]:
     return loop_lines(f"e in range(tid, {rows}, THREADS)", body)
 
 
-# --------------------------------------------------------------------------------------- the kernel
-
-
 ARGUMENTS = (
     "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
     "starts", "owns", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states",
@@ -399,9 +388,6 @@ def flight_text(plan: Plan, shape: BlockLayout) -> str:
     parts = [build.head, *build.source.blocks, *build.functions, "\n".join(text)]
     parts += [f"ROWS = {len(build.rows)}", f"COLUMNS = {len(sampled_columns(plan.metrics))}"]
     return "\n\n".join(parts) + "\n"
-
-
-# --------------------------------------------------------------------------------------------- time
 
 
 def _time(build: CudaBuilder) -> list[str]:

@@ -36,9 +36,6 @@ from airflock.engine.totals import combine_sums
 from airflock.scenarios import FORMATIONS, Scenario, step_counts
 from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, require_gpu
 
-# ------------------------------------------------------------------------------- sorting into cells
-
-
 # Rows of near are two vectors of four. A compiler that knows nothing of their place loads number by
 # number, seven times as often: one instruction of the GPU loads four. (Tables begin at multiples of
 # 256 bytes.)
@@ -172,9 +169,6 @@ def copy_agents(near, rest, cell, starts, listed, sorted_, rest_sorted):
         for c in range(rest.shape[1]):
             rest_sorted[place, c] = rest[a, c]
 """
-
-
-# ------------------------------------------------------------------------------- text of the driver
 
 
 NEIGHBOUR_COLUMNS = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
@@ -366,9 +360,6 @@ def signatures(bits: int) -> dict[str, tuple[Any, ...]]:
         "begin": (table, table, *common),
         "advance": (*[table] * 4, words, whole, whole, *common),
     }
-
-
-# ------------------------------------------------------------------------------------------ flights
 
 
 CELLS = 4  # at most so many cells per agent, as on the CPU

@@ -25,9 +25,6 @@ from airflock.engine.totals import combine_sums, goal_times
 from airflock.scenarios import largest_fitting
 from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, multiprocessor_count, require_gpu
 
-# ------------------------------------------------------------------------------------------- memory
-
-
 MAX_MEMORY_SHARE = 0.9  # of the free memory that may be used
 
 
@@ -99,9 +96,6 @@ def memory_message(agents: int, bytes_: int, room: int, fitting_agents: int) -> 
         f"a flock of {agents} agents needs {bytes_ / 1e9:.3g} GB of the GPU's memory and {room / 1e9:.3g} GB are free; "
         f"about {fitting_agents} agents fit"
     )
-
-
-# ----------------------------------------------------------------------------------------- launches
 
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress

@@ -21,9 +21,6 @@ from airflock.engine.replace import ReplacementError
 from airflock.engine.specialise.local_names import read_names, written_names
 from airflock.engine.stages.words import REDUCTION_START
 
-# --------------------------------------------------------------------------------------------- rows
-
-
 PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
 
 
@@ -196,9 +193,6 @@ class OwnRegisters(ast.NodeTransformer):
                 return node
         self.generic_visit(node)
         return node
-
-
-# --------------------------------------------------------------------------------- loops and totals
 
 
 NEUTRAL = {how: start.spelled for how, start in REDUCTION_START.items()}
@@ -408,9 +402,6 @@ def used_names(statements: list[ast.stmt]) -> tuple[set[str], set[str]]:
     """Names that statements read, those among them that they add to, and names that they write."""
     sums = [item.target for s in statements for item in walk_tree(s) if isinstance(item, ast.AugAssign)]
     return read_names(statements) | written_names(sums), written_names(statements)
-
-
-# -------------------------------------------------------------------------------------- reciprocals
 
 
 PREFIX = "per_"

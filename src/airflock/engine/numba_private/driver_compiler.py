@@ -18,8 +18,6 @@ from numba.core.typed_passes import NativeLowering, NativeParforLowering, Nopyth
 
 from airflock.engine.layout import CACHE_LINE
 
-# ---- Code of LLVM
-
 
 class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code of a function that Python calls."""
@@ -60,9 +58,6 @@ class InlinedLibrary(DriverLibrary):
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
         self._finalized = True
-
-
-# ---- Passes
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]

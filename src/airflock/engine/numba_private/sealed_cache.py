@@ -25,8 +25,6 @@ from numba.core.event import trigger_event
 from airflock.engine.never_collected import frozen_imports
 from airflock.support import locks
 
-# ---- Seals
-
 ENDING = ".seal"
 
 
@@ -119,8 +117,7 @@ def _remove(path: Path) -> None:
             os.unlink(found)
 
 
-# ---- One process compiles, the others load
-
+# One process compiles a driver, the others wait and load it.
 # The lock is one of the system's, on a file beside the driver: it ends with the process that holds it.
 
 LOCK_NAME = "lock"
@@ -189,8 +186,6 @@ def _taken(handle: int, until: float) -> bool:
         else:
             return True
 
-
-# ---- Around a compilation
 
 SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
 

@@ -25,9 +25,6 @@ from airflock.engine.stages.neighbours import widest_reach
 from airflock.engine.stages.neighbours_by_cells import neighbours_by_cells
 from airflock.engine.stages.words import BLOCK
 
-# -------------------------------------------------------------------------------------------- cells
-
-
 SORT = StageFunction("sort", ("n", "near", "most_cells", "row", "work", "cells"))
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
 
@@ -96,9 +93,6 @@ def sort_lines(build: Builder, min_width: str, max_cells: str) -> list[str]:
     """Lines that sort agents into about `most` cells no smaller than `near` (m)."""
     add_sort(build)
     return [*bind_lines(build), f"sides, count = sort(n, {min_width}, {max_cells}, row, work, cells)"]
-
-
-# -------------------------------------------------------------------------------------------- slots
 
 
 def uses_slots(plan: Plan) -> bool:

@@ -41,8 +41,6 @@ from airflock.engine.stages.near import ROUNDING_MARGIN, pairs_by_cells
 from airflock.engine.stages.words import IdentityRow, nonzero_fields, rule_asks
 from airflock.scenarios import FORMATIONS
 
-# ----------------------------------------------------- whether a driver looks for collisions at all
-
 
 def skippable_metrics(plan: Plan) -> tuple[MeasuredMetric, ...]:
     """Metrics that look for collisions, if all of them promise a distance beyond which there are none."""
@@ -65,9 +63,6 @@ def add_nearest(build: Builder) -> None:
     if uses_nearest_pair(build):
         made = specialise(build, approach.nearest)
         build.function("nearest(n, m, row, whole, work)", made.lines, f"return {made.answer}", once=True)
-
-
-# ------------------------------------------------------------------ random words and normal numbers
 
 
 def add_draw(build: Builder) -> noise.Draw:
@@ -99,9 +94,6 @@ def _draw(build: Builder, name: str, by_place: bool) -> None:
     build.function(
         f"{name}({known}step, stream, world, seed_low, seed_high, u0, u1, u2, u3)", ["apart()", *made.lines], once=True
     )
-
-
-# ----------------------------------------------------------------- what an agent measures and hears
 
 
 MEET_ARGUMENTS = "i, k_, n, m, row, whole, work"  # what the stage is called with
@@ -156,9 +148,6 @@ def add_receive(build: Builder) -> None:
     build.function(RECEIVE_CALLS[build.draws_per_pair], made.lines, f"return {made.answer}")
 
 
-# --------------------------------------------------------- the record that a law reads of its world
-
-
 FIELDS = ("half_x", "half_y", "half_z", "agent", "step", "world", "seed_low", "seed_high", "corners", "obstacles")
 CASTS = ("shapes", "nodes", "links", "near", "counts", "gathered")
 METHODS: dict[str, tuple[Callable[..., Any], str]] = {
@@ -183,9 +172,6 @@ def add_methods(build: Builder) -> None:
         method, arguments = METHODS[name]
         made = specialise(build, method)
         build.function(f"{marked[name]}({arguments})", made.lines, f"return {made.answer}")
-
-
-# ------------------------------------------------------------------------------ neighbours and laws
 
 
 def add_neighbours(build: Builder) -> None:
@@ -245,9 +231,6 @@ def _asked(build: Builder, sums: list[int]) -> list[int]:
     text = "\n".join(build.source.blocks)
     fields = model.Sums._fields  # type: ignore[union-attr]
     return [c for c in sums if f".{fields[c]}" in text] if "sums[" not in text and "*sums" not in text else sums
-
-
-# --------------------------------------------------------------------------------- start and motion
 
 
 NOISE, GUSTS = "step, m, row, whole, work, words", "step, row, whole, gust"  # what these stages are called with
@@ -312,9 +295,6 @@ def add_move(build: Builder) -> None:
     held = "held, " * uses_drift(build)
     head = f"step, n, m, {held}row, whole, work, words, gust{lanes}"
     build.stage("move", head, once, made.body, made.answer, apart=many)
-
-
-# --------------------------------------------------------------------------------- order parameters
 
 
 AVERAGED = {"x": {"x", "y", "z"}, "v": {"vx", "vy", "vz"}, "h": {"hx", "hy", "hz"}}  # fields of a mean
@@ -416,9 +396,6 @@ def add_clusters(build: Builder, metric: Metric, parts: dict[str, list[str]]) ->
         parts[name] = build.clusters(metric)
         return StageCall(f"{name}()")
     return sum_clusters
-
-
-# ------------------------------------------------------- stages that become functions as they stand
 
 
 class PlainStage(NamedTuple):

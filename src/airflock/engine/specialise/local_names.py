@@ -14,9 +14,6 @@ from typing import Any
 from airflock.core import walk_tree
 from airflock.engine.specialise.known_values import FunctionSyntax, name_kind
 
-# ----------------------------------------------------------------- names that two texts would share
-
-
 TABLES = frozenset({"work", "row", "whole", "words", "store", "scene", "scratch"})  # what bindings of a driver read
 MARK = re.compile(r"@(\d+)")
 LastWriters = dict[str, set[str]]  # of each name in the driver, who may have written it last: locals with their marks
@@ -189,9 +186,6 @@ def _copies(statement: ast.stmt, to: str, name: str) -> bool:
         return False
     names = [node.id for node in (*statement.targets, statement.value) if isinstance(node, ast.Name)]
     return names == [to, name]
-
-
-# --------------------------------------------------------------------- statements that nobody reads
 
 
 def read_names(nodes: Iterable[ast.AST]) -> set[str]:

@@ -48,9 +48,6 @@ from airflock.engine.stages.records import SortedCells, WorldArrays
 from airflock.engine.stages.state import SCENE_ARRAYS, FlockRows, own_row
 from airflock.engine.stages.words import IdentityRow, NamedConstant, ZeroRow
 
-# -------------------------------------------------------------------------------------- expressions
-
-
 # of the driver, whatever they are called with
 KEPT: dict[Any, str] = {
     word: word.__name__ for word in (words.real, words.integer, words.least, words.most, words.choose, words.copy_block)
@@ -348,9 +345,6 @@ def _record(value: object) -> bool:
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")
 
 
-# --------------------------------------------------------------------------------------- statements
-
-
 TABLE_PREFIXES = {
     "u": "words",
     "packet": "store",
@@ -608,9 +602,6 @@ def _name(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-# ------------------------------------------------------------------------------ the text of a stage
-
-
 @dataclass(frozen=True)
 class SpecialisedText:
     """Text of a stage for one plan.
@@ -645,9 +636,6 @@ class SpecialisedText:
 def lines_of(statements: list[ast.stmt]) -> list[str]:
     """Lines of statements."""
     return [line for statement in statements for line in ast.unparse(statement).splitlines()]
-
-
-# ------------------------------------------------------------------------------------ a whole stage
 
 
 def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> SpecialisedText:

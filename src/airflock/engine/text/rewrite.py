@@ -16,8 +16,6 @@ from airflock.core import component_names, law, walk_tree
 from airflock.engine.text.copies import DependencyRecorder
 from airflock.support import RuleError
 
-# ---------------------------------------------------------------------------- vectors of parameters
-
 
 class VectorUnroller(ast.NodeTransformer):
     """A rewriter that writes out the vectors of one rule.
@@ -132,9 +130,6 @@ def _sets(statements: list[ast.stmt], name: str) -> bool:
 def _left(node: ast.For) -> bool:
     """Return True if a loop may be left early, skip the rest of a turn, or do something at its end."""
     return bool(node.orelse) or any(isinstance(item, (ast.Break, ast.Continue)) for item in walk_tree(node))
-
-
-# -------------------------------------------------------------------------------------------- rules
 
 
 GIVEN = law.ALLOWED_CALLS | {law.CAST_NAME, *law.RENAMED_BUILTINS.values()}  # what every driver has

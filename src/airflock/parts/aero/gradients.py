@@ -50,9 +50,6 @@ def level(i, n, work):
     return far == 0.0
 
 
-# ------------------------------------------------------------------------------------------------ over one cell
-
-
 def turn_about(i, n, m, work, keep):
     """Keep the tables of wing i (keep = 1.0), or put them back."""
     tables = work.tables
@@ -114,9 +111,6 @@ def over_cells(i, n, work, wing, frozen):
             gz = gz + (drag if axis == 2 else 0.0)
     turn_about(i, n, m, work, 0.0)
     return gx, gy, gz
-
-
-# ------------------------------------------------------------------------------------------------------ analytic
 
 
 def slopes_of(n, work, wing):
