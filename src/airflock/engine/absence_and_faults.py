@@ -97,9 +97,6 @@ def _write(state: "DriverState", kind: Fault, slot: int, values: Mapping[str, An
             work[row, slot] = value
 
 
-# Agents that leave and come back.
-
-
 def remove_agents(state: "DriverState", agents: list[int]) -> None:
     """Make agents absent from now on; those that are absent already stay so."""
     # Absent agents lie behind the others, so no loop has a test. A mask would have to be respected

@@ -234,9 +234,6 @@ def _frames(scenario: Scenario, plan: Plan, agents: int) -> int:
     return 2 * (times["steps"] // times["sample_every"] + 1) * 3 * plan.dimensions * agents * plan.bits // 8
 
 
-# Messages of a flight that could not start or went wrong, and the step at which it did.
-
-
 def no_place_message(scenario: Scenario, seed: int, agent: int) -> str:
     """One line for an agent that found no place at the start."""
     walls = scenario.start.wall_clearance
@@ -273,9 +270,6 @@ def first_bad_step(state: DriverState, low: int, high: int, half: int = 0) -> in
             high = middle
             state.buffer[:] = kept
     return high
-
-
-# Flights.
 
 
 def driver_text(scenario: Scenario, *, precision: int = 32) -> str:

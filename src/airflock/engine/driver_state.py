@@ -219,9 +219,6 @@ class DriverMemory:
         return found if (slot := self.slots) is None else found[:, slot]
 
 
-# State: the memory, the driver and what is due on the way.
-
-
 class DriverState(DriverMemory):
     """A flight as its driver flies it, step by step."""
 
@@ -352,9 +349,6 @@ def _again(plan: Plan, tables: WorldTables, device: str, start: NDArray[Any], bu
     made = DriverState(plan, tables, driver_of(plan, device), start)
     made.buffer[:] = buffer
     return made
-
-
-# Handover to another driver, by the names of rows, so that the flight goes on.
 
 
 def hand_over(old: DriverState, new: DriverState, step: int) -> None:

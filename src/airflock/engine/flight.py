@@ -55,8 +55,6 @@ from airflock.scenarios import (
 )
 from airflock.support import FlightError, run_in_background
 
-# Pieces of a flight that leave it.
-
 
 @dataclass(frozen=True)
 class Window:
@@ -110,9 +108,6 @@ def check_sendable(*scenarios: Scenario) -> None:
                 f"{scenario.name}: its own code cannot be sent to another process; open it there by its file, "
                 "with the seed and the events of this flight, which then has the same bits"
             ) from fault
-
-
-# State and driver.
 
 
 class FlightState:
@@ -180,6 +175,8 @@ class FlightState:
         state, first, every = self.state, self.step, self.state.whole("sample_every")
         frames = None
         if self.record:
+            # Samples from `first` on and before `last`: both ends are rounded up, so that no cut of
+            # a flight counts one twice.
             count = -(-last // every) - -(-first // every)
             frames = np.full((count, 3 * state.plan.dimensions, state.agents), np.nan, state.tables.row.dtype)
         with compile_messages(state.driver, self.scenario.model.name):
@@ -226,6 +223,8 @@ class FlightState:
         plan = flight_plan(
             new, self.precision, self.record, given_start=old.given_start, absence=old.absence, device=self.device
         )
+        # The same plan flies by the same driver, so there is nothing to wait for: only numbers
+        # change.
         if wait or plan == old:
             state = self._opened(new, old.absence)
             self._coming = None
@@ -254,6 +253,7 @@ class FlightState:
             scenario, state = on_time, self._opened(on_time, state.plan.absence)
         if self.state.plan.absence and not state.plan.absence:  # somebody left while the change waited
             state = self._opened(scenario, absence=True)
+        # Of two changes at one step the first leaves no window: of no time there is no mean.
         if self.step > self.window_start:
             begin = self.window_start * self.scenario.flight.dt
             scores = self.scenario.judged(self.state.values())
@@ -286,6 +286,7 @@ class FlightState:
         state.set_onsets(old.tables.due)
         for name in ("sums", "values"):
             state.arrays[name][:] = old.arrays[name]
+        # Agent-steps of this window, those that were there and all: so far everybody was there.
         state.arrays["there"][:] = (self.step - self.window_start) * state.agents
         self.state = state
 
@@ -316,6 +317,8 @@ class FlightState:
         """Go back (or on) to a moment of this course or of a twin of it. Raises FlightError for any other."""
         if not isinstance(moment, Snapshot):
             raise FlightError(f"snapshot = {moment!r} is not what snapshot() of a flight returns")
+        # Rows of the buffer have places and no names: another version may lay them out in another
+        # way.
         if moment.version != __version__:
             raise FlightError(f"snapshot: made by version {moment.version}, this is {__version__}")
         device, record = device_of(moment.state.driver), moment.state.plan.record
@@ -326,6 +329,8 @@ class FlightState:
                 f"record = {record}; not of this flight"
             )
         self._coming = None
+        # The moment keeps the driver's state of its time. A twin, or this flight after a change,
+        # flies on by a copy, so that others can still go back to it.
         if self.state is not moment.state:
             self.state = moment.state.copy()
         self.state.buffer[:] = moment.bytes
@@ -339,6 +344,8 @@ class FlightState:
         """Another course that goes on from here."""
         twin = object.__new__(FlightState)
         vars(twin).update(vars(self))
+        # A change that waits for its compiler stays with the first flight: its state can be taken
+        # over once.
         twin.state, twin._coming = self.state.copy(), None
         twin.events, twin.windows = list(self.events), list(self.windows)
         twin._frames, twin._sampled = list(self._frames), list(self._sampled)
@@ -357,6 +364,8 @@ class FlightState:
             raise FlightError(f"world = {world!r} is not a whole number from 0 to 2^32 - 1")
         self.world = world = int(world)
         self.state.set_integer("world", world)
+        # Faults are drawn by the world, too. All entries last, so that a fault which has begun goes
+        # on in every branch.
         if self.state.plan.faults:
             self._expect(self.state, draw_onsets(self.scenario, self.seed, world), range(len(self.scenario.faults)))
         self.note("branch", world=world)
@@ -376,9 +385,6 @@ def _faults_at_the_end(events: Sequence[Event]) -> int:
         elif event.kind == "change" and "faults" in event.data:
             count = 0
     return count
-
-
-# What can be read.
 
 
 class FlightObservations:
@@ -546,6 +552,8 @@ class FlightObservations:
         number = self._there(agent)
         if not self.decides or self._course.has_sensed or self._state.plan.sequential:
             return agent_view(self.scenario, self._state, number, self.step, self.seed, self.world)
+        # The first half of the step is flown and taken back: the percept is that of the coming
+        # decision, and the flight keeps its bits.
         kept = self._state.buffer.copy()
         self._state.advance(self.step, self.step + 1, 2)
         found = agent_view(self.scenario, self._state, number, self.step, self.seed, self.world)
@@ -791,9 +799,6 @@ def _within(what: str, given: list[Any], most: float, unit: str, why: str) -> No
     for row in np.atleast_2d(np.array(given, float)).tolist():
         if max(map(abs, row)) > most:
             raise FlightError(f"{what} = {row} {unit} lies outside [-{most:g}, {most:g}] {unit} per axis; {why}")
-
-
-# The table in a notebook.
 
 
 def flight_html(flight: "Flight") -> str:

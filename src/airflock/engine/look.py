@@ -45,6 +45,8 @@ def agent_view(scenario: Scenario, state: DriverState, agent: int, step: int, se
         beside = other._replace(state=_beside(scenario, own, other.state))
         given = one.pair_arguments(own, beside, agent, scenario.group_indices[agent])
         far = not meets or given["r"] > near
+        # The same neighbour at the same velocity: a page draws that answer as repulsion, the rest as
+        # alignment.
         same = given | {"dvx": 0.0, "dvy": 0.0, "dvz": 0.0, "dv": norm(0.0, 0.0, 0.0)}
         same |= {f"n{name}": given[name] for name in ("hx", "hy", "hz")}
         found = [call_rule(model.neighbour, "neighbour", case | {"p": p}, model.name) for case in (given, same)]
@@ -121,6 +123,7 @@ def _heard(
         distance = math.dist(true[:3], truth[i][:3])
         if j == i or distance > min(k.range, 1e8):
             continue
+        # As in the driver: the lower number first, since a signal fades equally in both directions.
         pair = min(i, j) * n + max(i, j)
         fade = random.normal_pair(*random.random_words(seed, random.FADE, world, number, pair)[:2])[0] if fades else 0.0
         if plan.packets:

@@ -37,8 +37,6 @@ from airflock.world import (
     rays,
 )
 
-# Properties of a plan, and options of its driver.
-
 
 class GroupLaw(NamedTuple):
     """A law that groups of a flock fly by, beside that of the others.
@@ -157,8 +155,6 @@ class PlanProperties:
     own_text: Hashable = ()
 
 
-# The plan.
-
 INTEGER_NAMES = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
     "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born", "lag",
@@ -220,6 +216,8 @@ class Plan(PlanProperties):
         """Return this plan as the stages of one law see it: its model, and its numbers under the letter p."""
         if not self.laws or law == 0:
             return replace(self, law=law) if self.laws else self
+        # Stages read the numbers of any law under the letter p, so that one text serves all laws;
+        # those of the first law give way as p0.
         own, letters = self.laws[law - 1], {"p": "p0", f"p{law}": "p"}
         numbers = tuple((letters.get(letter, letter), fields) for letter, fields in self.numbers)
         varied = own.varied + tuple(each for each in self.varied if each[0] != "p")
@@ -240,6 +238,7 @@ class Plan(PlanProperties):
         """Rows of what differs among agents, as (letter, name): numbers, which laws share by name, law and group."""
         found = [*self.varied, *(each for own in self.laws for each in own.varied)]
         found += [("", "law")] if self.laws else []
+        # No agent flies by two laws, so a row serves all laws that vary a number of one name.
         return tuple(dict.fromkeys([*found, *([("", "group")] if self.uses_groups else [])]))
 
     def suffers(self, *rules: str) -> tuple[Fault, ...]:
@@ -273,7 +272,9 @@ class Plan(PlanProperties):
         What is heard was sent a delay ago, by the faults and the clock of then, whatever has begun
         or ended since.
         """
+        # Who is seen reports nothing: the errors of its own sensor do not reach the observer.
         rules = ("clock",) if self.sees else ("sense", "tell", "clock")
+        # Without a delay what is heard was sent now, so the present columns of the faults serve.
         kinds = self.suffers(*rules) if self.late else ()
         found = [(kind.name, what) for kind in kinds for what in ("onset", "lasts", *kind.fields)]
         return tuple((2 * self.dimensions + c, kind, what) for c, (kind, what) in enumerate(found))

@@ -11,7 +11,6 @@ import xarray as xr
 from airflock.recordings.dataset import DIMENSIONS, check_recording
 from airflock.support import RecordingError, atomic, suffix_error, to_path
 
-# Exports: the ending of the name decides the format, `layout` the names inside.
 SUFFIXES = (".csv", ".parquet", ".nc")
 LAYOUTS = ("movement", "movement-0.16", "px4")
 
@@ -61,7 +60,6 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     return write_parquet(recording, target)
 
 
-# Long tables: one row per instant and individual that is present.
 COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command": ("cx", "cy", "cz")}
 
 
@@ -133,7 +131,6 @@ def write_parquet(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
-# Datasets of `movement`, in the layout of today and of releases until 0.16.
 STATES = ("position", "velocity", "command")
 PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
 

@@ -270,7 +270,6 @@ def measure_recording(
     return kept, course[[name for name in course if name not in undefined]]
 
 
-# Groups: order parameters of each group of a recording, and between each two of them.
 PAIR_METRICS = {
     "r_centres": ("m", "mean distance between the centres of two groups; nan in a periodic world"),
     "r_between": ("m", "smallest distance between agents of the two groups"),

@@ -71,6 +71,7 @@ class Objective:
             return min(found) if self.maximise else max(found)
         if self.over_seeds == "quantile":
             return float(np.quantile(found, self.quantile if self.maximise else 1.0 - self.quantile))
+        # fsum rounds once: a mean must not depend on the order in which flights have landed.
         return math.fsum(found) / len(found)
 
     def error_of_flight(self, values: Mapping[str, Any]) -> tuple[str, bool]:
@@ -107,6 +108,7 @@ def candidate_losses(
     for column in table.T:
         lost = np.isnan(column)
         worst = column[~lost].max() if (~lost).any() else 0.0
+        # Optimisers here rank candidates, so any loss beyond the worst will do.
         column[lost] = worst + 1.0
     return table
 

@@ -102,6 +102,7 @@ def cylinder(x, y, z, a, b, c, d):
     """Inside of an upright cylinder of radius d (m) about (a, b); one radial shill agent. c is not used."""
     sx = a - x
     sy = b - y
+    # 1e-12: on the axis no direction leads out, and none may be nan.
     s = math.sqrt(sx * sx + sy * sy + 1e-12)
     return Surface(d - s, sx / s, sy / s, 0.0 * c)
 
@@ -130,6 +131,7 @@ def convex_obstacle(x, y, z, edges, first, last):
             best = qx * qx + qy * qy
             px = qx
             py = qy
+    # From within, the nearest edge is the way out: distance and normal change their sign.
     k = 1.0 - 2.0 * inside
     far = math.sqrt(best + 1e-12)
     return Surface(k * far, k * px / far, k * py / far, 0.0 * z)

@@ -30,6 +30,7 @@ def entry(x, y, z, ix, iy, iz, x0, y0, z0, x1, y1, z1, radius):
     by = (y1 + radius - y) * iy
     az = (z0 - radius - z) * iz
     bz = (z1 + radius - z) * iz
+    # Slabs (Kay & Kajiya 1986): the ray is in the box where it is between all three pairs of faces.
     near = max(min(ax, bx), max(min(ay, by), min(az, bz)))
     far = min(max(ax, bx), min(max(ay, by), max(az, bz)))
     return max(near, 0.0) if (near <= far) & (far >= 0.0) else FAR
@@ -61,6 +62,8 @@ def ray_to_segment(x, y, ux, uy, ax, ay, bx, by):
     cross = ux * ty - uy * tx
     side = 1.0 if cross > 0.0 else -1.0
     bound = abs(cross) + TINY
+    # Numerators are compared with the denominator before any division, which would be by 0 for a
+    # ray along the wall.
     t = (px * ty - py * tx) * side
     s = (px * uy - py * ux) * side
     return t / bound if (t >= 0.0) & (s >= 0.0) & (s <= bound) else FAR
@@ -121,6 +124,7 @@ def sphere_to_shape(x, y, z, ux, uy, uz, shapes, k, start, best, radius):
         s = from_shape(x + t * ux, y + t * uy, z + t * uz, shapes, k)
         gap = s.distance - radius
         slope = ux * s.nx + uy * s.ny + uz * s.nz
+        # Convex along the way: a distance that grows never shrinks again.
         if slope >= 0.0:
             return FAR
         if gap <= SKIN:

@@ -48,9 +48,8 @@ def grid_memory(
         ((agents,), whole), ((agents, _width(plan)), real), ((components, agents + BLOCK), real),
         ((agents * max(1, fields),), real),
     )  # fmt: skip
-    # not made again at each step: the pages of what is given back must be zeroed again before they
-    # are used Allocated once per flight: allocation at every step was part of the 203 ns of an
-    # agent-step.
+    # Allocated once per flight: the system zeroes the pages of what is given back before they are
+    # used again, and at every step that was part of the 203 ns of an agent-step.
     return (tuple(rows(shape, kind) for shape, kind in shapes),)
 
 

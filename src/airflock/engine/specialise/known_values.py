@@ -130,6 +130,7 @@ def function_syntax(function: Callable[..., Any]) -> FunctionSyntax:
     code = function.__code__
     node = _module(code.co_filename)[code.co_name, code.co_firstlineno]
     loops = [item for item in walk_tree(node) if isinstance(item, ast.comprehension)]
+    # Names of a comprehension live in it alone and are no locals of the stage.
     inner = {id(name) for loop in loops for name in walk_tree(loop.target)}
     bound = Counter(
         item.id

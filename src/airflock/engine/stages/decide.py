@@ -85,8 +85,8 @@ def decide(
         shared = shared_record(i, flock, model=model) if law_asks(model, "shared") else None
         memory = record_from_table(i, model.Memory, mem, 0) if law_asks(model, "memory") else None
         if perceives and model.sight is not None:
-            # decided side by side, each agent gathers into memory of its own Shapes in sight are
-            # gathered once per decision for all rays; beyond 64 each cast walks the tree.
+            # Shapes in sight are gathered once per decision for all rays; beyond 64 each cast walks
+            # the tree. By cells threads decide side by side, so each gathers into memory of its own.
             near = np.empty(MAX_GATHERED, np.int64) if plan.grid else scene.near
             counts = np.zeros(2, np.int64) if plan.grid else scene.counts
             counts[0] = 0

@@ -408,7 +408,6 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
         )
 
 
-# Checks of a fitted body: the lag by another way, and gusts that all drones feel.
 MIN_ROWS = 200  # fewest rows for an estimate
 
 

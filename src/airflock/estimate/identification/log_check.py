@@ -17,7 +17,6 @@ from airflock.recordings import packet_uniforms, simulate
 from airflock.scenarios import Scenario, build_scenario
 
 Array = NDArray[np.float64]
-# Flights of the identified scenario against the log, by the same measures.
 PERIOD = 0.2  # s between frames of the check
 LONGEST = 600.0  # s that are flown
 SETTLED = 30.0  # s at the start of a flight that are left out

@@ -16,7 +16,6 @@ from airflock.estimate.identification.body_and_sensor import hessian
 from airflock.parts.radios import links, table
 from airflock.support import RecordingError
 
-# Packets: age and clocks by least squares, reception by distance by likelihood.
 TABLE_KEYS: tuple[str, ...] = tuple(f"radio.received_{n}" for n in range(table.ENTRIES))
 COLUMNS = ("receiver", "sender", "t", "stamp")
 NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow")

@@ -121,7 +121,6 @@ def logs_from_recording(recording: xr.Dataset) -> FlightLogs:
     return FlightLogs(time[keep], place, speed, wish, who[keep], left_out[keep], names, np.zeros(int(keep.sum()), bool))
 
 
-# Decision period and largest commanded speed, from the commands alone.
 FEW = 30  # fewest changes of a command for an estimate of the period
 PLATEAU = 0.01  # share of rows within half a per cent of the largest command that make a limit
 

@@ -97,6 +97,7 @@ def over_cells(i, n, work, wing, frozen):
     gx = 0.0
     gy = 0.0
     gz = 0.0
+    # The trials write the tables of wing i only, so these are kept once for all six.
     turn_about(i, n, m, work, 1.0)
     for k in range(6):
         axis = k // 2
@@ -129,6 +130,8 @@ def slopes_of(n, work, wing):
                     place[2][i] - place[2][j], m, pitch(wing), core * core,
                 )  # fmt: skip
                 for k in range(m):
+                    # An influence depends on the difference of two segments only: transposed, its
+                    # row reads backwards.
                     mirror[i * n + j][first + k] = tables[i * n + j][first - k]
                     mirror[i * n + j][first - k] = tables[i * n + j][first + k]
 
@@ -164,6 +167,8 @@ def sensitivities(i, n, work, wing):
     for _ in range(SWEEPS):
         change = 0.0
         for e in range(n):
+            # The wing itself first: its row alone has a source, which then reaches all others in
+            # the first sweep.
             j = (i + e) % n
             back_wash(j, n, m, work.mirror, adjoint, wash)
             for k in range(m):
@@ -175,6 +180,8 @@ def sensitivities(i, n, work, wing):
                 adjoint[j][k] = fresh
         if change <= limit:
             break
+    # Wings that nearly overlap do not settle; one factorisation answers, as in
+    # `lifting_line.solve`.
     if change > 1000.0 * limit:
         assemble(n, m, work)
         factorise(work.dense, work.pivots, n * m)
@@ -250,6 +257,8 @@ def analytic(i, n, work, wing, frozen):
                 gx = gx + bilinear(adjoint, i, slopes, row, circulation, j, m, spare)
                 gy = gy + bilinear(adjoint, i, slopes, row + 1, circulation, j, m, spare)
                 row = 3 * (j * n + i)
+                # What wing i induces on another one changes by the opposite offset, hence the
+                # minus.
                 gx = gx - bilinear(adjoint, j, slopes, row, circulation, i, m, spare)
                 gy = gy - bilinear(adjoint, j, slopes, row + 1, circulation, i, m, spare)
                 if not flat:

@@ -239,7 +239,6 @@ def _read_sleap(file: xr.Dataset, path: Path, options: ImportOptions) -> list[Im
     return read_array(values, options, str(path), given if len(given) == values.shape[1] else None)
 
 
-# Datasets of `movement`, and Airflock's own.
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 
 

@@ -62,7 +62,6 @@ def vectors_to_origin(
     return rotated
 
 
-# Local frame: latitudes and longitudes become metres, and tracks of several frames get one origin.
 DEGREES = {"lat": 90.0, "lon": 360.0}  # the largest that there are
 FAR = 5e4  # m from the origin; beyond, the curvature of the earth is told
 

@@ -367,7 +367,6 @@ def _track(
     return found
 
 
-# The beginning of a text table: its encoding, lines above it, its delimiter, and names of columns.
 DELIMITERS = (",", ";", "\t", "|")
 BLANKS = r"\s+"  # where nothing else separates columns, as NumPy writes tables
 MOST = 1 << 20  # bytes that are looked at

@@ -20,7 +20,6 @@ from airflock.recordings.imports.track import (
 )
 from airflock.support import RecordingError, collect_errors, suggest
 
-# Headers: the quantity in a column, and its unit.
 LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
          "cs": 0.01}  # fmt: skip
@@ -353,7 +352,6 @@ def quote_names(text: str, columns: Sequence[str]) -> str:
     )
 
 
-# Layout: the column of each quantity, by --map or by the headers; and the values in SI units.
 MAX_COLUMNS = 2000
 OF_A_TRACKER = ("probability", "likelihood", "score", "confidence", "wcentroid")
 

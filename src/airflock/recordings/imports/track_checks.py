@@ -27,7 +27,6 @@ from airflock.recordings.imports.track import (
 from airflock.support import RecordingError
 
 Array = NDArray[np.float64]
-# Rows without a time, a place or a speed: each is reported with file, column, number and first row.
 PLACE_TARGETS = (*POSITION_TARGETS[:2], *GEODETIC_TARGETS[:2])
 MissingRows = dict[
     str, list[tuple[NDArray[np.int64], int]]
@@ -207,7 +206,6 @@ def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) 
         findings.notes.append(f"{source}: {named}{line}")
 
 
-# Times, individuals and heights: rules 1, 4, 7 and presence. Each error is one line.
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
 SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
 SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain

@@ -34,6 +34,8 @@ def check_header(path: Path, kind: str, size: int, max_triangles: int) -> None:
 def _stl(path: Path, size: int) -> None:
     with path.open("rb") as file:
         head = file.read(84)
+        # Some programs begin the header of a binary file with "solid", too; a line break in it
+        # marks a text.
         if head[:5].lower() == b"solid" and b"\n" in head:
             file.seek(max(0, size - 512))
             if b"endsolid" not in file.read():
@@ -91,6 +93,8 @@ def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64]
             f"scene.file = {p.file}: glTF has y up by its standard, and is turned upright; scene.up = 'z' leaves it"
         )
     if gltf or p.up == "y":
+        # A quarter turn about x. Two axes that merely change places would mirror the mesh, and turn
+        # its faces inside out.
         corners = np.stack([corners[:, 0], -corners[:, 2], corners[:, 1]], axis=1)
     faults = mesh_size_errors(p, corners)
     if faults:
@@ -131,6 +135,7 @@ def closed_faces(mesh: Any) -> NDArray[np.bool_]:
     size = len(mesh.vertices)
     parts = connected_components(coo_array((np.ones(len(ends)), ends.T), (size, size)), directed=False)[1]
     closed = np.ones(size, bool)
+    # An edge of an odd number of faces is free; a single one opens the whole part.
     closed[parts[ends[uses % 2 == 1, 0]]] = False
     found: NDArray[np.bool_] = closed[parts[faces[:, 0]]]
     return found
@@ -141,6 +146,7 @@ def cut_at_ground(mesh: Any, closed: NDArray[np.bool_]) -> NDArray[np.float64]:
     from trimesh import intersections
 
     crossings: Any = intersections.mesh_plane
+    # A micrometre above 0, since the floor of a house often lies in the plane itself.
     lines, faces = crossings(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, 1e-6), return_faces=True)
     a, b = np.asarray(lines).reshape(-1, 2, 3)[:, :, :2].transpose(1, 0, 2)
     out = mesh.face_normals[faces]
@@ -167,6 +173,7 @@ def read_mesh(path: Path) -> Any:
         raise SceneError(
             f"scene.file = {path}: {size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB; simplify the mesh"
         )
+    # Before trimesh opens it: a small file that places one mesh many times expands to all of them.
     check_header(path, kind, size, MOST_TRIANGLES)
     try:
         mesh: Any = trimesh.load(path, force="mesh", process=True, skip_materials=True)

@@ -122,6 +122,8 @@ def _tree(shapes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.fl
         number = len(nodes)
         nodes.append(np.concatenate([low[members].min(axis=0), high[members].max(axis=0)]))
         links.append([0, len(order), len(order)])
+        # Below both halves on the stack: when its turn comes, the next number is that of the node
+        # at which a walk goes on that misses this one.
         pending.append((members[:0], number))
         if len(members) <= LEAF:
             order.extend(members.tolist())
@@ -129,6 +131,8 @@ def _tree(shapes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.fl
             continue
         axis = int(np.ptp(middle[members], axis=0).argmax())
         half = len(members) // 2
+        # At the median of the members, not of the space: however they lie, the depth is the
+        # logarithm of their number.
         sides = np.argpartition(middle[members, axis], half)
         pending.append((members[sides[half:]], -1))
         pending.append((members[sides[:half]], -1))
@@ -262,8 +266,10 @@ def _faces(ring: tuple[tuple[float, ...], ...], low: float, high: float) -> list
 def appearance_times(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
     """Draw when each shape appears, s; 0 for the start. Trunk and crown of a tree come together."""
     parts = 2 if p.kind == "forest" else 1
+    # A stream of its own: shapes that come later stand where they would stand otherwise.
     rng = np.random.default_rng([int(p.seed), 2])
     late, when = rng.uniform(0.0, 1.0, (2, count // parts))
+    # A time of 0 means that it stands from the start, so a time that is drawn lies above.
     return np.tile(np.where(late < p.later, np.maximum(when * p.later_until, 1e-6), 0.0), parts)
 
 

@@ -146,6 +146,7 @@ def divisor(weights, others, p):
 def cohesion_speed(far, p):
     """Demand towards a centroid at this distance, m: m/s (Eq. 1)."""
     s = far / p.r_c
+    # Bounded: for a flock that has come apart it would overflow single precision, from 88 on.
     grown = math.exp(min(s * s, 50.0))
     if p.cohesion == "C1":
         return p.k_c * s * s

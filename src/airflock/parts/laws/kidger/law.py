@@ -175,6 +175,8 @@ def neighbour(dx, dy, dz, r, dvx, dvy, dvz, vx, vy, vz, hx, hy, hz, p):
 def take(t, x, y, z, scale, p):
     """The tally after one more suggestion (m/s) of this scale, by the chosen scheme; oracles in order of importance."""
     size = norm(x, y, z)
+    # An oracle that suggests nothing must not count as one that spoke: schemes 1, 2 and 4 count
+    # them.
     if (size < 1e-5) | (scale == 0.0):
         return t
     share = 1.0
@@ -292,6 +294,7 @@ def decide(own, sums, percept, period, p):
     """Movement, m/s: what the oracles suggest together, with obstacle avoidance where the way ahead is not free."""
     t = others(Tally(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), own, sums, percept, p)
     mx, my, mz = movement(t, p)
+    # The thesis multiplies by accel once a frame; a decision lasts FRAMES * period of them.
     grow = p.accel ** (FRAMES * period)
     k = min(grow, p.speed / norm(mx, my, mz))
     mx = k * mx
@@ -311,6 +314,7 @@ def decide(own, sums, percept, period, p):
     way = way_out(percept, hx, hy, hz, ahead, p)
     v = min(p.speed, 0.9 * way.free / period)  # a boxed-in boid stops short of the wall
     t = take(Tally(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), v * way.x, v * way.y, v * way.z, p.s_obst, p)
+    # Boxed in: what other oracles add would lead into the wall before which it stops.
     if (p.scheme == "5") & (v < p.speed):
         return v * way.x, v * way.y, v * way.z
     t = others(t, own, sums, percept, p)
