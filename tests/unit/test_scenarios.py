@@ -1,14 +1,21 @@
 """Scenario files: every fault in one line, all at once, whatever is in the file."""
 
 import copy
+import json
 import tomllib
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
+import airflock
+from airflock.recordings.flown_scenario import scenario_of_recording
+from airflock.runs.dask_cluster import rebuild_scenario
+from airflock.runs.folder import write_toml_file
+from airflock.scenarios import formats
 from airflock.scenarios.files import load, presets, scenario_variant
-from airflock.scenarios.scenario_builder import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario, with_settings
+from airflock.search.study import load_study
 from airflock.support.errors import AirflockError, ScenarioError
 
 DOCUMENTS = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in presets().items()}
@@ -253,3 +260,36 @@ def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():
         "world.corners": [[0.0, 0.0], [200.0, 0.0], ["2", 1.0]],
     }
     assert "world.corners is not a list of points [east, north] in m" in faults_of(texts)[0]
+
+
+def test_a_step_between_two_formats_reads_each_file_once_on_every_way(tmp_path, monkeypatch):
+    """A step is planted that adds a cross to the title: one that doubled a speed would do so in silence."""
+    (tmp_path / "base.toml").write_text('agents = 2\nduration = 2.0\n[model]\nkind = "vasarhelyi_2018"\n')
+    (tmp_path / "own.toml").write_text('extends = "base.toml"\ntitle = "own"\n')
+    old = airflock.simulate(load(str(tmp_path / "own.toml")), 1, precision=64, device="python")
+    airflock.save(old, tmp_path / "old.nc")
+    step = lambda old: {**old, "title": f"{old.get('title', '')}+"}  # noqa: E731
+    monkeypatch.setattr(formats, "MIGRATIONS", (step,))
+    monkeypatch.setattr(formats, "FORMAT", 2)
+    scenario = load(str(tmp_path / "own.toml"))
+    write_toml_file(tmp_path / "again.toml", scenario.document)
+    flown = airflock.simulate(scenario, 1, precision=64, device="python")
+    airflock.save(flown, tmp_path / "new.nc")
+    flight = airflock.open(scenario, 1, precision=64, device="python")
+    flight.change({"model.p_rep": 0.3})
+    study = load_study(str(tmp_path / "own.toml"))
+    found = {
+        "file": scenario,
+        "file that was written": load(str(tmp_path / "again.toml")),
+        "changed": with_settings(scenario, {"model.p_rep": 0.2}),
+        "changed twice": with_settings(with_settings(scenario, {"model.p_rep": 0.2}), {"model.p_rep": 0.1}),
+        "changed in flight": flight.scenario,
+        "of a study": build_scenario(study.document()["scenario"], "study"),
+        "on a worker": rebuild_scenario(json.dumps(scenario.document), "worker"),
+        "recorded before": scenario_of_recording(airflock.load_recording(tmp_path / "old.nc")),
+        "recorded after": scenario_of_recording(airflock.load_recording(tmp_path / "new.nc")),
+    }
+    assert {way: one.document["title"] for way, one in found.items()} == dict.fromkeys(found, "own+")
+    (tmp_path / "newer.toml").write_text('format = 3\nextends = "base.toml"\n')
+    with pytest.raises(ScenarioError, match="format = 3 is newer than this Airflock, which reads up to 2"):
+        load(str(tmp_path / "newer.toml"))

@@ -12,7 +12,7 @@ from airflock.parts.aero import descent
 from airflock.parts.metrics import POWER_SETTINGS
 from airflock.recordings.attributes import check_format, metrics_settings, scenario_document, uses_user_law
 from airflock.recordings.dataset import recording_frames
-from airflock.scenarios import PART_KINDS, SECTIONS, CallerParts, Scenario, build_scenario, settings_dict
+from airflock.scenarios import PART_KINDS, SECTIONS, CallerParts, Scenario, build_scenario, formats, settings_dict
 from airflock.support import RecordingError, as_error
 
 
@@ -76,7 +76,8 @@ def scenario_of_recording(
         },
         "world": {"dimensions": str(dims), "arena": "none"},
     }
-    return build_scenario(document, "recording", settings, caller_parts=CallerParts(law=UNKNOWN), trust=trust)
+    parts = CallerParts(law=UNKNOWN)
+    return build_scenario(formats.numbered(document), "recording", settings, caller_parts=parts, trust=trust)
 
 
 def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dataset, trust: bool) -> Scenario:

@@ -178,7 +178,7 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     # A study read as a scenario would give one error per key.
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
-    return {**formats.to_current_format(document, name), formats.KEY: formats.FORMAT}, path.parent
+    return formats.numbered(formats.to_current_format(document, name)), path.parent
 
 
 def _with_given(

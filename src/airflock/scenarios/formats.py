@@ -27,3 +27,9 @@ def to_current_format(document: Mapping[str, Any], where: str) -> Mapping[str, A
     for step in MIGRATIONS[number - 1 :]:
         document = step(document)
     return {key: value for key, value in document.items() if key != KEY}
+
+
+def numbered(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a document of the current format with its number, so that no step reads it once more."""
+    # Format 1 goes without: recordings, certificates and studies hold scenarios as version 0.1 wrote them.
+    return {**document, KEY: FORMAT} if FORMAT > 1 else dict(document)

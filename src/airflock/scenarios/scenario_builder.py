@@ -107,7 +107,9 @@ def build_scenario(
     rules = {"body": flown.body, "sensors": flown.sensors, "radio": flown.radio, "metrics": flown.metrics}
     rules["topology"] = flown.topology or TOPOLOGIES[parts["topology"].kind]
     parts |= {section: Part(rule, parts[section]) for section, rule in rules.items()}
-    scenario = Scenario(name=where, model=flown.law, published=published, document=whole, **parts, **individuals)
+    scenario = Scenario(
+        name=where, model=flown.law, published=published, document=formats.numbered(whole), **parts, **individuals
+    )
     # These checks need a whole scenario, so they come second and never beside errors of single
     # keys.
     if errors := _derived_errors(scenario) or scene_errors(scenario, started):

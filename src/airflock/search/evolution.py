@@ -35,7 +35,7 @@ from airflock.runs import (
     to_toml_values,
     with_parameters,
 )
-from airflock.scenarios import Scenario, load, scenario_variant, value_of
+from airflock.scenarios import Scenario, formats, load, scenario_variant, value_of
 from airflock.search.finals import conclude_study
 from airflock.search.generations import Evaluator, OnSearchProgress, run_search
 from airflock.search.objectives import Objective, UserFitness
@@ -355,7 +355,7 @@ def resume_study(
     named = {key.rpartition(".")[2] for key in settings}
     flown = {
         key: value
-        for key, value in _changed(held.get("scenario", {}), now["scenario"])
+        for key, value in _changed(formats.to_current_format(held.get("scenario", {}), str(folder)), now["scenario"])
         if key not in settings and key.rpartition(".")[2] not in named
     }
     keys = {key: value for key, value in held.get("search", {}).items() if key not in search}
