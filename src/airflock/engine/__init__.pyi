@@ -1,4 +1,5 @@
 # The door: what other rooms may use; the rest is private to the room.
+from .c_printing import print_law as print_law
 from .closed_flights import (
     compile_for as compile_for,
     driver_text as driver_text,

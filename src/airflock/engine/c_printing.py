@@ -1,0 +1,521 @@
+"""Print a law, body, sensor, radio or fault as C99: header, source, and a test that replays answers of plain Python."""
+
+import ast
+import math
+import os
+import random
+import re
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from airflock.core import (
+    FAR,
+    FAULT_RULES,
+    PERCEPT_METHODS,
+    TINY,
+    HeardNeighbour,
+    Own,
+    Percept,
+    Quantity,
+    State,
+    declarations,
+    norm,
+    number_names,
+    pair_arguments,
+    tree_of,
+    vector_sizes,
+)
+from airflock.engine.text.c99 import PRELUDE, REAL, WHOLE, CPrinter, Function
+from airflock.scenarios import MODELS, Scenario, find_law, scenario_variant
+from airflock.support import AirflockError, RuleError, expand_path, suggest, to_identifier
+
+# The rules that are printed of each kind, and the letter of its numbers. Others (`flock`, `limits`,
+# `lasts`, `see`) speak of a whole flock or scenario.
+KINDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "law": (
+        "p",
+        ("preferred_speed", "interaction_range", "reach", "sight", "wall_reach", "neighbour", "boundary", "decide"),
+    ),
+    "body": ("b", ("move", "endures")),
+    "sensor": ("s", ("measure", "error")),
+    "radio": ("k", ("missed", "late", "carry", "receive")),
+    "fault": ("f", tuple(FAULT_RULES)),
+}
+RECORDS = {"sums": "Sums", "walls": "Walls", "memory": "Memory", "packet": "Packet"}  # argument → record of the part
+STUBS = ("crazyflie.c", "stm32.c", "px4.cpp")
+CASES = 10_000
+
+
+class PrintedPart(NamedTuple):
+    """A part as C: its name in C, the part, its numbers, and its rules by their names."""
+
+    name: str
+    part: Any
+    numbers: Any
+    letter: str
+    rules: dict[str, Callable[..., Any]]
+    printer: CPrinter
+    functions: dict[str, Function]
+
+
+def print_law(
+    law: Scenario | str | os.PathLike[str],
+    *,
+    part: str = "law",
+    settings: Mapping[str, Any] | None = None,
+    precision: int = 32,
+    out: str | os.PathLike[str] | None = None,
+    trust: bool = False,
+) -> list[Path]:
+    """Print a flocking law, or another part of a scenario, as C99 without allocation, globals or recursion.
+
+    Parameters
+    ----------
+    law : Scenario, str or path
+        A preset or scenario file, whose numbers become the defaults; or a law by its name or its file.
+    part : str
+        law, body, sensor, radio, or the name of one of the scenario's faults.
+    settings : mapping, optional
+        Keys of the scenario to change, such as {"model.p_rep": 0.14}.
+    precision : int
+        Bits of a number, 32 or 64; AIRFLOCK_PRECISION chooses the other one when the files are compiled.
+    out : str or path, optional
+        Folder to write to; by default one named after the part.
+    trust : bool
+        Whether code that a file names may run.
+
+    Returns
+    -------
+    list of Path
+        The files: header, source, test with its cases, CMakeLists.txt, and of a law stubs for firmware.
+
+    Raises
+    ------
+    RuleError
+        Where a rule has no form in C, such as a loop: with file, line, and what to write instead.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> files = airflock.print_law("vasarhelyi_2018/4ms", out="law")  # doctest: +SKIP
+    """
+    if precision not in (32, 64):
+        raise AirflockError(f"precision = {precision!r} is none of 32, 64")
+    printed = printed_part(law, part, settings, trust)
+    folder = Path(printed.name) if out is None else expand_path(out)
+    name = printed.name
+    files: dict[str, str | bytes] = {
+        f"{name}.h": header_text(printed, precision),
+        f"{name}.c": source_text(printed),
+        f"test_{name}.c": test_text(printed),
+        f"{name}.cases": cases_of(printed, CASES),
+        "CMakeLists.txt": _template("CMakeLists.txt", name),
+    }
+    # Stubs send velocities, and call a law without a memory.
+    if getattr(printed.part, "command", "") == "velocity" and printed.part.Memory is None:
+        files |= {f"stub_{stub}": _template(stub, name) for stub in STUBS}
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, content in files.items():
+        (folder / file).write_bytes(content if isinstance(content, bytes) else content.encode())
+    return [folder / file for file in files]
+
+
+def _template(file: str, name: str) -> str:
+    text = resources.files("airflock.engine.text").joinpath(f"templates/{file}").read_text(encoding="utf-8")
+    return text.replace("@LAW@", name)
+
+
+def printed_part(
+    law: Scenario | str | os.PathLike[str], part: str, settings: Mapping[str, Any] | None, trust: bool
+) -> PrintedPart:
+    """Return a part of a scenario, or a law by its name or file, with its rules as C functions."""
+    kind = part
+    text = law if isinstance(law, Scenario) else os.fspath(law)
+    if part == "law" and isinstance(text, str) and not settings and (text in MODELS or text.endswith(".py")):
+        rules: Any = find_law(text, where="law", trust=True)
+        numbers = rules.Parameters()
+    else:
+        scenario = scenario_variant(law, settings, trust=trust)
+        faults = {entry.fault.name: entry for entry in scenario.faults}
+        known: dict[str, tuple[Any, Any]] = {"law": (scenario.model, scenario.parameters)}
+        for name, own in (("body", scenario.body), ("sensor", scenario.sensors), ("radio", scenario.radio)):
+            known[name] = (own.rule, own.numbers)
+        known |= {name: (entry.fault, entry.numbers) for name, entry in faults.items()}
+        if part not in known:
+            raise AirflockError(f"part = {part!r}: {scenario.name} has no such part; {suggest(part, known)}")
+        rules, numbers = known[part]
+        kind = "fault" if part in faults else part
+    letter, names = KINDS[kind]
+    if getattr(rules, "flock", None) is not None or getattr(rules, "added", None) is not None:
+        raise RuleError(
+            f"{rules.name} solves for the whole flock at once, which no single drone can do; it is not printed"
+        )
+    chosen = {name: value for name, value in vars(numbers).items() if isinstance(value, str)}
+    plain = number_names(numbers)
+    name = to_identifier(rules.name)
+    printer = CPrinter(name, {letter: chosen}, {letter: vector_sizes(plain)})
+    types = {"fast": WHOLE, "slow": WHOLE, letter: printer.record(f"{name}_Parameters", plain)}
+    types["own"] = printer.record(f"{name}_Own", Own._fields)
+    types["percept"] = printer.record(f"{name}_Percept", Percept._fields)
+    for argument, record in RECORDS.items():
+        found = getattr(rules, record, None)
+        if found is not None:
+            types[argument] = printer.source.name(found)
+    own_rules = {each: getattr(rules, each) for each in names if getattr(rules, each, None) is not None}
+    functions = {each: printer.rule(rule, types) for each, rule in own_rules.items()}
+    if not functions:
+        raise RuleError(f"{rules.name} has no rule that can be printed; {kind} rules are {', '.join(names)}")
+    return PrintedPart(name, rules, numbers, letter, own_rules, printer, functions)
+
+
+# ---- Text of the files
+
+
+def header_text(printed: PrintedPart, precision: int) -> str:
+    """Return the header: numbers with unit, range and source, records, and the rules."""
+    name, printer = printed.name, printed.printer
+    guard = f"AIRFLOCK_{name.upper()}_H"
+    chosen = [f"{key} = {value}" for key, value in vars(printed.numbers).items() if isinstance(value, str)]
+    title = (getattr(printed.part, "doc", "") or "").strip().partition("\n")[0]
+    lines = [
+        f"/* {name}: {title or 'printed rules'}",
+        " * Printed by Airflock from the Python text that flies; SI units. Do not edit it: print it again.",
+        *([f" * Choices that are compiled in: {', '.join(chosen)}."] if chosen else []),
+        " */",
+        f"#ifndef {guard}", f"#define {guard}", "",
+        "#ifndef AIRFLOCK_PRECISION", f"#define AIRFLOCK_PRECISION {precision}", "#endif",
+        "#ifndef AIRFLOCK_REAL", "#define AIRFLOCK_REAL",
+        "#if AIRFLOCK_PRECISION == 32", "typedef float real;", "#define R(number) number##f",
+        "#else", "typedef double real;", "#define R(number) number", "#endif", "#endif", "",
+    ]  # fmt: skip
+    about = {key: declared for key, declared, _ in declarations(printed.numbers) if isinstance(declared, Quantity)}
+    source = command_text(printed)  # first, as it declares structs of its own
+    for record, fields in printer.structs.items():
+        if record == f"{name}_Percept":
+            lines += _percept_struct(name)
+            continue
+        lines.append("typedef struct {")
+        for field, kind in fields.items():
+            note = about.get(field) if record == f"{name}_Parameters" else None
+            lines.append(f"  {kind} {field};" + (f"  {_note(note)}" if note else ""))
+        lines += [*([] if fields else ["  char nothing;  /* C has no empty struct */"]), f"}} {record};", ""]
+    values = ", ".join(f"R({float(getattr(printed.numbers, key))!r})" for key in number_names(printed.numbers)) or "0"
+    lines += [f"#define {name}_DEFAULTS {{{values}}}", ""]
+    for rule, function in printed.functions.items():
+        doc = (printed.rules[rule].__doc__ or rule).strip().partition("\n")[0]
+        lines += [f"/* {doc.replace('*/', '')} */", _prototype(function), ""]
+    lines += [source.partition("{")[0].rstrip() + ";", ""] if source else []
+    return "\n".join([*lines, "#endif", ""])
+
+
+def _note(declared: Quantity) -> str:
+    unit = "" if declared.unit == "1" else f"{declared.unit}, "
+    text = f"{unit}{declared.low:g} to {declared.high:g}: {declared.meaning} ({declared.source})"
+    return f"/* {' '.join(text.replace('*/', '').split())} */"
+
+
+def _percept_struct(name: str) -> list[str]:
+    """Return the lines of the struct of a percept: offsets, and what ranges and draws on board."""
+    fields = [f"  real {field};" for field in Percept._fields]
+    calls = [
+        "  real (*ray)(const void *context, real ux, real uy, real uz, real length);",
+        "  real (*cast)(const void *context, real ux, real uy, real uz, real length, real radius);",
+        "  real (*normal)(const void *context, int draw);",
+        "  real (*uniform)(const void *context, int draw);",
+        "  const void *context;  /* handed to each of the four; those that the law does not call may be 0 */",
+    ]
+    return ["typedef struct {", *fields, *calls, f"}} {name}_Percept;", ""]
+
+
+def _prototype(function: Function) -> str:
+    head, _, _ = function.text.partition(" {")
+    return f"{head};"
+
+
+def source_text(printed: PrintedPart) -> str:
+    """Return the source: what rules call, the rules, and of a law its whole decision."""
+    printer, rules = printed.printer, {function.name for function in printed.functions.values()}
+    decision = command_text(printed)
+    used = sorted(printer.used - PRELUDE.keys())
+    lines = [f'#include "{printed.name}.h"', "", "#include <math.h>", ""]
+    lines += ["#if AIRFLOCK_PRECISION == 32", *(f"#define r_{each} {each}f" for each in used)]
+    lines += ["#else", *(f"#define r_{each} {each}" for each in used), "#endif", ""]
+    for name in (each for each in PRELUDE if each in printer.used):
+        lines += [PRELUDE[name], ""]
+    for function in printer.functions.values():
+        lines += [("" if function.name in rules else "static ") + function.text, ""]
+    return "\n".join([*lines, *([decision, ""] if decision else [])])
+
+
+class _PairNames(ast.NodeTransformer):
+    """Writes the arguments of a pair as C has them: of the heard neighbour each field by itself."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """Write heard.age as age, and so on."""
+        if isinstance(node.value, ast.Name) and node.value.id == "heard":
+            return ast.Name({"group": "heard_group"}.get(node.attr, node.attr), ast.Load())
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Write the guard of a square as its number."""
+        return ast.Constant(TINY) if node.id == "TINY" else node
+
+
+def _pair_function(printed: PrintedPart, wanted: Sequence[str]) -> None:
+    """Print what a rule of neighbours asks for, from the text by which a pilot computes it on board."""
+    printer, name = printed.printer, f"{printed.name}_pair"
+    printer.source.name(norm)
+    tree = tree_of(pair_arguments)
+    last = tree.body[-1]
+    assert isinstance(last, ast.Return) and isinstance(last.value, ast.Dict)
+    values = {key.value: value for key, value in zip(last.value.keys, last.value.values, strict=True)}  # type: ignore[union-attr]
+    body = [item for item in tree.body if isinstance(item, ast.Assign) and "heard" not in ast.unparse(item)]
+    call = ast.Call(ast.Name(f"{printed.name}_Pair", ast.Load()), [values[each] for each in wanted], [])
+    names = ("own", "other", "age", "who", "heard_group", "index", "group")
+    arguments = ast.arguments([], [ast.arg(each) for each in names], None, [], [], None, [])
+    function = ast.FunctionDef(name, arguments, [*body, ast.Return(call)], [], lineno=1)
+    text = ast.unparse(ast.fix_missing_locations(_PairNames().visit(function)))
+    printer.record(f"{printed.name}_Pair", wanted)
+    printer.source.blocks.append(text.replace("norm(", f"{printer.source.name(norm)}("))
+    state = printer.record(f"{printed.name}_State", State._fields)
+    printer.called(name, [state, state, REAL, WHOLE, REAL, WHOLE, REAL])
+
+
+def command_text(printed: PrintedPart) -> str:
+    """Return the function that makes a whole decision from what was heard; empty for what is no law of one drone."""
+    rule = printed.functions.get("decide")
+    if rule is None or any(each in rule.arguments for each in ("wing", "aero", "shared")):
+        return ""
+    name, printer, part = printed.name, printed.printer, printed.part
+    start = {"sum": "R(0.0)", "min": f"R({FAR!r})", "max": f"-R({FAR!r})"}
+    lines = [
+        f"  const real f = R(1.0) / {printer.source.name(norm)}(state->vx, state->vy, state->vz);",
+        f"  const {name}_Own own = {{state->vx, state->vy, state->vz, f * state->vx, f * state->vy, f * state->vz}};",
+        "  (void)own;",
+    ]
+    printer.called(printer.source.name(norm), [REAL] * 3)
+    printer.struct(f"{name}_Heard", {"state": printer.record(f"{name}_State", State._fields),
+                                     "age": REAL, "who": WHOLE, "group": REAL})  # fmt: skip
+    printer.record(f"{name}_Surface", ("distance", "nx", "ny", "nz"))
+    for record, argument, count, kind in (
+        ("Sums", "sums", "neighbours", "neighbour"),
+        ("Walls", "walls", "walls_near", "boundary"),
+    ):
+        if getattr(part, record, None) is None:
+            continue
+        fields = getattr(part, record)._fields
+        how = part.reduce if record == "Sums" else {}
+        struct_name = printer.source.name(getattr(part, record))
+        lines.append(f"  {struct_name} {argument} = {{{', '.join(start[how.get(each, 'sum')] for each in fields)}}};")
+        function = printed.functions.get(kind)
+        if function is None:
+            continue
+        lines.append(f"  for (int i = 0; i < {count}; i++) {{")
+        given = [each for each in function.arguments if each != "p"]
+        near = "  "
+        if kind == "neighbour":
+            wanted = list(dict.fromkeys([*given, "r2"]))
+            _pair_function(printed, wanted)
+            lines.append(f"    const {name}_Heard *other = &heard[i];")
+            given_pair = "state, &other->state, other->age, other->who, other->group, index, group"
+            lines.append(f"    const {name}_Pair pair = {name}_pair({given_pair});")
+            if "reach" in printed.functions:
+                lines.append(f"    const real near = {printed.functions['reach'].name}(p);")
+                lines.append(f"    if (!(pair.r2 <= near * near + R({TINY!r}))) continue;")
+            values = [f"pair.{each}" for each in given]
+        else:
+            values = [f"state->{each}" if each in State._fields else f"surfaces[i].{each}" for each in given]
+        places = dict(zip(given, values, strict=True)) | {"p": "p"}
+        values_in_order = ", ".join(places[each] for each in function.arguments)
+        lines.append(f"  {near}const {struct_name} term = {function.name}({values_in_order});")
+        for each in fields:
+            way = how.get(each, "sum")
+            total, value = f"{argument}.{each}", f"term.{each}"
+            more = f"{total} + {value}" if way == "sum" else f"{'least' if way == 'min' else 'most'}({total}, {value})"
+            printer.used |= {"least" if way == "min" else "most"} if way != "sum" else set()
+            lines.append(f"  {near}{total} = {more};")
+        lines.append("  }")
+    places = {each: f"&{each}" for each in ("own", "sums", "walls")}
+    lines.append(f"  return {rule.name}({', '.join(places.get(each, each) for each in rule.arguments)});")
+    text = "\n".join(lines)
+    names = ("p", "index", "group", "heard", "neighbours", "surfaces", "walls_near", "percept", "period")
+    unread = [each for each in names if not re.search(rf"\b{each}\b", text)]
+    memory = f"const {rule.arguments['memory']} *memory, " if "memory" in rule.arguments else ""
+    head = (
+        f"/* One decision of agent `index` of group `group` (-1: of none), from its own state and what it hears. */\n"
+        f"{rule.returned} {name}_command(\n"
+        f"    const {name}_Parameters *p, const {name}_State *state, int index, real group,\n"
+        f"    const {name}_Heard *heard, int neighbours, const {name}_Surface *surfaces, int walls_near, {memory}"
+        f"const {name}_Percept *percept, real period)"
+    )
+    return "\n".join([head + " {", *(f"  (void){each};" for each in unread), *lines, "}"])
+
+
+# ---- The test that replays answers of plain Python
+
+
+class CasePercept(Percept):
+    """Percept whose ranges and draws are simple functions of their arguments, the same in C."""
+
+    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
+        """Return the whole length in a cone to the north-east, else half of it."""
+        return length if 0.8 * ux + 0.6 * uy > 0.3 else 0.5 * length
+
+    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
+        """Return the same for a sphere."""
+        return self.ray(ux, uy, uz, length)
+
+    def normal(self, draw: int) -> float:
+        """Return a number that differs from draw to draw."""
+        return 0.25 * draw - 0.75
+
+    def uniform(self, draw: int) -> float:
+        """Return a number that differs from draw to draw."""
+        return 0.125 + 0.03125 * draw
+
+
+def cases_of(printed: PrintedPart, count: int, seed: int = 0) -> bytes:
+    """Return so many cases of each rule as doubles: its arguments, then the answers of plain Python."""
+    rng, found = random.Random(seed), bytearray()
+    for name, rule in printed.rules.items():
+        found += struct.pack("<d", count)
+        done = 0
+        while done < count:
+            given = drawn_arguments(printed, name, rng)
+            try:
+                answer = _flat(rule(*(given[each] for each in printed.functions[name].arguments)))
+            except (ZeroDivisionError, OverflowError, ValueError):
+                continue  # plain Python raises where a processor gives inf or nan
+            row = [
+                x
+                for each, value in given.items()
+                for x in _flat(value, printed.numbers if each == printed.letter else None)
+            ]
+            if all(math.isfinite(each) for each in (*row, *answer)):
+                found += struct.pack(f"<{len(row) + len(answer)}d", *row, *answer)
+                done += 1
+    return bytes(found)
+
+
+def _flat(value: Any, numbers: Any = None) -> list[float]:
+    """Return the numbers of a value, of a record, or of several values."""
+    if numbers is not None:
+        return [float(getattr(value, name)) for name in number_names(numbers)]
+    return [x for each in value for x in _flat(each)] if isinstance(value, tuple) else [float(value)]
+
+
+def drawn_arguments(printed: PrintedPart, name: str, rng: random.Random) -> dict[str, Any]:
+    """Draw the arguments of a rule: flights of some m/s, some ten metres from each other."""
+    part, numbers = printed.part, printed.numbers
+    if rng.random() < 0.5:
+        about = {key: declared for key, declared, _ in declarations(numbers) if isinstance(declared, Quantity)}
+        moved = {key: getattr(numbers, key) * rng.uniform(0.5, 1.5) for key in about}
+        numbers = type(numbers)(
+            **vars(numbers) | {k: min(max(v, about[k].low), about[k].high) for k, v in moved.items()}
+        )
+    own, heard = (State(*(rng.gauss(0.0, 25.0 if axis in "xyz" else 4.0) for axis in State._fields)) for _ in range(2))
+    values: dict[str, Any] = pair_arguments(own, HeardNeighbour(rng.randrange(9), heard, rng.expovariate(1.0)), 4)
+    normal = [rng.gauss(0.0, 1.0) for _ in range(3)]
+    values |= {key: each / norm(*normal) for key, each in zip(("nx", "ny", "nz"), normal, strict=True)}
+    values["own"] = Own(*(values[each] for each in Own._fields))
+    values["percept"] = CasePercept(*(rng.gauss(0.0, 50.0) for _ in Percept._fields))
+    values |= {"distance": rng.gauss(10.0, 20.0), "period": 0.1, "dt": rng.uniform(0.005, 0.1), printed.letter: numbers}
+    for argument, record in RECORDS.items():
+        kind = getattr(part, record, None)
+        if kind is not None:
+            start = getattr(kind, "_field_defaults", {})
+            spread = 1.0 if start else 3.0
+            values[argument] = kind(*(start.get(each, 0.0) + rng.gauss(0.0, spread) for each in kind._fields))
+    values |= {each: rng.randrange(30) for each in ("fast", "slow")}
+    values |= {each: float(rng.randrange(most)) for each, most in (("talkers", 20), ("step", 1000), ("clear", 2))}
+    values |= {each: rng.expovariate(0.1) for each in ("since", "reach", "age")}
+    values |= {f"u{c}": rng.random() for c in range(4)}
+
+    def number(argument: str) -> float:
+        return rng.gauss(0.0, 1.0 if argument.startswith("g") else 5.0)
+
+    return {each: values[each] if each in values else number(each) for each in printed.functions[name].arguments}
+
+
+def test_text(printed: PrintedPart) -> str:
+    """Return the test program, which counts the numbers that differ from those of plain Python."""
+    name, printer = printed.name, printed.printer
+    lines = [
+        f"/* Replays answers of the Python text from which {name} was printed. */",
+        f'#include "{name}.h"', "", "#include <math.h>", "#include <stdio.h>", "",
+        "typedef struct { long numbers, others, far; double worst; } Outcome;", "",
+        "static void compare(Outcome *outcome, real found, double expected) {",
+        "  const double off = fabs((double)found - expected) / fmax(fabs(expected), 1.0);",
+        "  outcome->numbers++;",
+        "  if ((double)found != expected) outcome->others++;",
+        "  if (!(off <= outcome->worst)) outcome->worst = off;",
+        "  if (!(off <= 1e-3)) outcome->far++;",
+        "}", "",
+    ]  # fmt: skip
+    percept = f"{name}_Percept"
+    if any(percept in function.arguments.values() for function in printed.functions.values()):
+        arguments = {"ray": "real ux, real uy, real uz, real length", "normal": "int draw", "uniform": "int draw"}
+        arguments["cast"] = arguments["ray"] + ", real radius"
+        values = {
+            "ray": "R(0.8) * ux + R(0.6) * uy > R(0.3) ? length : R(0.5) * length",
+            "cast": "ray(0, ux, uy, uz, length)",
+            "normal": "R(0.25) * (real)draw - R(0.75)", "uniform": "R(0.125) + R(0.03125) * (real)draw",
+        }  # fmt: skip
+        for method in PERCEPT_METHODS:
+            unread = "".join(
+                f"(void){each}; "
+                for each in ("uz", "radius")
+                if f"real {each}" in arguments[method] and (method, each) != ("cast", "uz")
+            )
+            lines += [f"static real {method}(const void *context, {arguments[method]}) {{",
+                      f"  (void)context; {unread}return {values[method]};", "}", ""]  # fmt: skip
+    for rule, function in printed.functions.items():
+        fields, outputs = _places(printer, function.arguments), _paths(printer, function.returned)
+        lines += [f"static int replay_{rule}(FILE *file, Outcome *outcome) {{",
+                  f"  double count, v[{len(fields) + len(outputs)}];",
+                  "  if (fread(&count, sizeof count, 1, file) != 1) return 0;",
+                  "  for (int i = 0; i < (int)count; i++) {",
+                  "    if (fread(v, sizeof v, 1, file) != 1) return 0;"]  # fmt: skip
+        for argument, kind in function.arguments.items():
+            if kind in (REAL, WHOLE):
+                lines.append(f"    const {kind} {argument} = ({kind})v[{fields.index((argument, ''))}];")
+                continue
+            values_of = [f"(real)v[{fields.index((argument, each))}]" for each in printer.structs[kind]]
+            more = ["ray", "cast", "normal", "uniform", "0"] if kind == percept else []
+            lines.append(f"    const {kind} {argument} = {{{', '.join([*values_of, *more]) or '0'}}};")
+        given = ", ".join(each if kind in (REAL, WHOLE) else f"&{each}" for each, kind in function.arguments.items())
+        lines.append(f"    const {function.returned} found = {function.name}({given});")
+        lines += [f"    compare(outcome, found{path}, v[{len(fields) + k}]);" for k, path in enumerate(outputs)]
+        lines += ["  }", "  return 1;", "}", ""]
+    lines += ["int main(int count, char **words) {", "  FILE *file = count == 2 ? fopen(words[1], \"rb\") : 0;",
+              f'  if (!file) return fprintf(stderr, "usage: test_{name} {name}.cases\\n"), 2;',
+              "  int bad = 0;"]  # fmt: skip
+    for rule in printed.functions:
+        lines += ["  {", "    Outcome outcome = {0, 0, 0, 0.0};", f"    if (!replay_{rule}(file, &outcome)) return 2;",
+                  f'    printf("{rule}: %ld numbers, %ld with other bits, %ld far off, largest difference %.1e\\n",',
+                  "           outcome.numbers, outcome.others, outcome.far, outcome.worst);",
+                  "    /* In single precision a branch may go the other way where two numbers nearly agree. */",
+                  "    bad |= sizeof(real) == 8 ? outcome.worst > 1e-12 : outcome.far * 100 > outcome.numbers;",
+                  "  }"]  # fmt: skip
+    return "\n".join([*lines, "  fclose(file);", "  return bad;", "}", ""])
+
+
+def _places(printer: CPrinter, arguments: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return argument and field of each number of a case, in their order."""
+    return [
+        place
+        for argument, kind in arguments.items()
+        for place in (
+            [(argument, "")] if kind in (REAL, WHOLE) else [(argument, each) for each in printer.structs[kind]]
+        )
+    ]
+
+
+def _paths(printer: CPrinter, kind: str) -> list[str]:
+    """Return how each number of an answer is read."""
+    if kind in (REAL, WHOLE):
+        return [""]
+    return [f".{name}{rest}" for name, each in printer.structs[kind].items() for rest in _paths(printer, each)]
