@@ -49,7 +49,7 @@ CAUSES = {
     "streams": OF_STREAMS,
     "reboot": (
         *OF_STREAMS, "rebooted", "no own position", "no valid position", "is disarmed", "disarmed on the ground",
-        "before its mission", "has not reported", "navigation:", "battery: not told", "does not report",
+        "before its mission", "has not reported", "navigation:", "battery: unknown", "does not report",
         "PreArm: Fence", "own checks before arming", "sent none", "not armed in time", "autopilot refuses",
     ),
 }  # fmt: skip

@@ -34,6 +34,8 @@ SWITCHES = {
     "neighbour is lost": {"heard": False}, "neighbour is heard": {"heard": True},
     "neighbour flies near": {"near": True}, "neighbour is far": {"near": False},
     "lands by a failsafe": {"land": True, "failsafe": True}, "failsafe is over": {"failsafe": False},
+    "commands are lost": {"deaf": True}, "commands arrive": {"deaf": False},
+    "landing is reported falsely": {"lying": True}, "landing is reported truly": {"lying": False},
 }  # fmt: skip
 ACTIONS = (
     "pilot arms",
@@ -71,7 +73,8 @@ class Flight:
         self.resumed = False  # by an order since it stood last
         self.ground_ticks = 0  # in a phase that flies
         self.pilot, self.land, self.lift, self.weak, self.position, self.fix = True, False, 0.0, False, True, 3
-        self.silent = self.blind = self.near = self.failsafe = False
+        self.silent = self.blind = self.near = self.failsafe = self.deaf = self.lying = False
+        self.is_armed_by_pilot, self.spinning_ticks = False, 0  # on the ground, where it should stand
         self.jumped = False  # in flight, and nobody has released it since
         self.called_home = False  # by an order in flight, and nobody has released it since
         self.clock, self.battery, self.heard, self.log = 0.0, 90.0, True, []
@@ -94,7 +97,7 @@ class Flight:
             point = (round(goal.latitude * 1e7), round(goal.longitude * 1e7), round(goal.altitude * 1e3))
             node.operator._obey(OperatorOrder(event, 0, self.card.mission, now, now, point), now)
             self.resumed |= event == OrderKind.RESUME
-            self.jumped &= event in (OrderKind.HOLD, OrderKind.GO, OrderKind.START)
+            self.jumped &= event != OrderKind.RESUME
             self.called_home |= event == OrderKind.RETURN and node.phase in FLYING_PHASES
             self.called_home &= event not in (OrderKind.RESUME, OrderKind.GOTO)
             if event == OrderKind.START:
@@ -107,6 +110,7 @@ class Flight:
             self.pilot = self.land = False
             self.apply(OrderKind.RESUME)
         elif event == "pilot arms":
+            self.is_armed_by_pilot |= self.z == 0.0
             self.armed = self.armed or self.z == 0.0
         elif event == "pilot disarms":
             self.armed = self.armed and self.z > 0.0
@@ -133,7 +137,8 @@ class Flight:
         self.log += [(round(self.now, 1), note) for note in out.notes if "→" in note]
         for name, *values in out.autopilot:
             self._check_command(name, values)
-            self._obey(name, values)
+            if not self.deaf:
+                self._obey(name, values)
         self._check(was, stood)
 
     def _move(self):
@@ -165,11 +170,12 @@ class Flight:
         silent = {24} if self.silent else set()
         silent |= ({245} if self.blind else set()) | (set() if self.position else {32, 33})
         link.arrivals |= {number: now for number in STREAM_RATES if number not in silent}
-        link.is_landed = link.is_landed if self.blind else self.z == 0.0
+        link.is_landed = link.is_landed if self.blind else self.lying or self.z == 0.0
         link.fix_type, link.horizontal_accuracy, link.battery = self.fix, 1.0, self.battery
         link.clock_offsets, link.in_failsafe = [self.clock], self.failsafe
         if self.position:
-            link._moved(State(self.x, 0.0, self.z, 0.0, 0.0, self.speed_up), now)
+            link.global_state, link.global_at = State(self.x, 0.0, self.z, 0.0, 0.0, self.speed_up), now
+            link._moved(link.global_state, now)
         peer = self.node.peers.all[2]
         if self.heard:
             peer.heard_at = peer.at = now
@@ -210,6 +216,11 @@ class Flight:
     def _check(self, was, stood):
         """Check the phase after a tick."""
         phase, seen = self.node.phase, not self.blind
+        self.is_armed_by_pilot &= self.armed
+        stands = phase in (P.READY, P.CLEARED, P.DONE) and self.z == 0.0 and self.mode != self.card.autopilot.hold
+        spins = stands and self.armed and not self.is_armed_by_pilot and not self.deaf
+        self.spinning_ticks = self.spinning_ticks + 1 if spins else 0
+        assert self.spinning_ticks < 9, ("turns its motors in", phase, self.log)
         if phase == P.READY and was in (P.ARMING, P.LAND, P.MANUAL):
             self.start_at = None
         if phase in (P.GATHER, P.FLOCK, P.GOTO) and phase != was and seen:

@@ -516,7 +516,7 @@ def test_an_autopilot_that_is_not_heard_is_told_until_it_is():
     (lambda v: setattr(v, "state", v.state._replace(y=2e6)), r"is 2000 km away from the card's site"),
     (lambda v: setattr(v, "battery", 20.0), "battery: 20 %"),
     (lambda v: setattr(v, "accuracy", 9.0), "accuracy 9.0 m"),
-    (lambda v: setattr(v, "start_time", START_TIME + 700_000), r"clock: \+0.70 s .* start the node anew"),
+    (lambda v: setattr(v, "start_time", START_TIME + 700_000), r"clock: \+0.70 s .* restart the node"),
     (lambda v: setattr(v, "state", v.state._replace(x=500.0)), "outside the fence: is the card's site right"),
 ])  # fmt: skip
 def test_each_miss_is_told_in_a_line(change, line):

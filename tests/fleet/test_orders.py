@@ -4,7 +4,7 @@ import pytest
 
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.mission import MissionPhase
-from airflock.drones.onboard.node import KILL_SECONDS
+from airflock.drones.onboard.node import STOP_SECONDS
 from airflock.fleets.vehicle import GUIDED, PILOT_MODE
 from fleets import fleet, scenario
 
@@ -88,8 +88,34 @@ def test_a_kill_is_repeated_until_the_autopilot_follows_and_no_longer():
     vehicle.receive = obeys
     found.advance(2.0)
     assert not vehicle.armed
-    found.advance(2.0 * KILL_SECONDS)
+    found.advance(2.0 * STOP_SECONDS)
     vehicle.armed, vehicle.mode = True, PILOT_MODE  # it fell; somebody else has another flight in mind
+    found.advance(5.0)
+    assert vehicle.armed
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+@pytest.mark.parametrize("lost", [0.0, 1.0, 3.0])
+def test_drone_whose_start_is_called_off_is_disarmed_though_packets_are_lost(kind, lost):
+    """At each moment from its arming to its take-off; its pilot's own arming is left alone."""
+    for tick in range(6):
+        found = on_the_ground(autopilot=kind)
+        vehicle = found.vehicles[0]
+        found.order(OrderKind.START, at=6.0)
+        while not vehicle.armed:
+            found.advance(0.05)
+        found.advance(0.05 * tick)
+        obeys = vehicle.receive
+        vehicle.receive = lambda data, now: b""
+        found.order(OrderKind.HOLD)
+        found.advance(lost)
+        vehicle.receive = obeys
+        found.advance(2.0)  # ArduPilot would switch them off by itself after 10 s
+        assert not vehicle.armed, (tick, found.log)
+        found.advance(10.0)
+        assert not any(v.armed for v in found.vehicles), (tick, found.log)
+    vehicle.armed, vehicle.mode = True, PILOT_MODE
+    vehicle._idle_since = found.now
     found.advance(5.0)
     assert vehicle.armed
 

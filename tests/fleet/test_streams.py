@@ -207,6 +207,41 @@ def test_each_stream_that_ends_on_the_ground_is_requested_again(name):
 
 
 @pytest.mark.parametrize("name", ["gps", "landed", "system_time", "sys_status", "global", "local"])
+def test_stream_that_never_came_is_missing_and_nothing_arms(name):
+    both = Beside(**{name: 0.0})
+    both.live(6.0, insists={name: 0.0})
+    both.order(OrderKind.START)
+    assert both.live(6.0, insists={name: 0.0}) == P.READY and not both.vehicle.armed, both.record.notes
+
+
+@pytest.mark.parametrize("rate", [0.1, 0.25, 0.4, 0.49, 0.5])
+def test_streams_that_pause_on_the_ground_are_taken_for_a_reboot_once(rate):
+    """Their time since boot goes on, so no later silence is; a reboot after that is still noticed, by its time."""
+    both = Beside()
+    both.live(5.0)
+    slow = dict.fromkeys(SILENT, rate)
+    both.live(60.0, insists=slow)
+    noticed = [at for at, note in both.record.notes if "rebooted" in note]
+    assert len(noticed) <= 1, noticed
+    both.vehicle.reboot()
+    both.live(60.0, insists=slow)
+    later = [at for at, note in both.record.notes if "rebooted" in note]
+    assert len(noticed) < len(later) <= len(noticed) + 2, later
+
+
+@pytest.mark.parametrize("name", ["gps", "landed", "system_time", "sys_status", "global"])
+def test_each_stream_that_ends_for_good_in_the_air_ends_the_flight_at_home(name):
+    """Without SYS_STATUS nobody knows how long the battery lasts."""
+    both = Beside().in_the_air()
+    begun = both.now
+    both.live(90.0, insists={name: 0.0})
+    assert both.record.first("sent none for 5 s", begun) is not None, both.record.notes
+    home = both.record.first("HOLD → RETURN: a stream of the autopilot is silent for too long", begun)
+    assert home is not None and 10.0 < home - begun < 20.0, both.record.notes
+    assert both.vehicle.state.z == 0.0 and not both.vehicle.armed
+
+
+@pytest.mark.parametrize("name", ["gps", "landed", "system_time", "sys_status", "global", "local"])
 def test_each_stream_that_ends_for_good_is_reported_and_nothing_arms(name):
     both = Beside()
     both.live(5.0)

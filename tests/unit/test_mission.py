@@ -81,17 +81,19 @@ ROWS = [
     (
         "27",
         P.LAND,
-        {"is_landed": True, "in_land_mode": True, "is_high": False},
+        {"landed_for": 1.1, "in_land_mode": True, "is_high": False},
         P.DONE,
-        {"is_landed": False, "kill_confirmed": True},
+        {"kill_confirmed": True},
         P.DONE,
     ),
     ("27b", P.LAND, {"armed": False, "has_flown": False}, P.READY, {"kill_confirmed": True}, P.DONE),
     ("28", P.BOOT, {"is_landed": False}, P.MANUAL, None, None),
     ("28b", P.DONE, {"in_guided_mode": False}, P.MANUAL, None, None),
     ("28b", P.ARMING, {"in_guided_mode": False}, P.MANUAL, {"kill_confirmed": True}, P.DONE),
-    ("29", P.HOLD, {"is_landed": True, "landed_for": 1.1}, P.LAND, {"kill_confirmed": True}, P.DONE),
+    ("29", P.HOLD, {"is_landed": True, "landed_for": 5.1}, P.LAND, {"kill_confirmed": True}, P.DONE),
+    ("29", P.GOTO, {"is_landed": True, "landed_for": 1.1, "is_high": False}, P.LAND, PILOT, P.MANUAL),
     ("30", P.FLOCK, {"bad_streams": ("own position at 4.2 Hz",)}, P.HOLD, {"position_bad_for": 9.0}, P.LAND),
+    ("30b", P.HOLD, {"silent_streams_for": 10.1}, P.RETURN, {"gnss_bad_for": 11.0}, P.LAND),
 ]
 
 
@@ -202,9 +204,9 @@ def test_drone_that_is_called_home_without_a_position_never_flocks_on():
     assert flight.node.phase == P.RETURN
 
 
-@pytest.mark.parametrize("ticks", [1, 5, 30])
+@pytest.mark.parametrize("ticks", [1, 5, 20, 30])
 def test_drone_whose_autopilot_reports_the_ground_in_the_air_is_seen_by_the_others(ticks):
-    """They do not avoid whom they take to stand; it lands, and no tick of it is unseen."""
+    """They do not avoid whom they take to stand; no tick of it is unseen, and it lands after 5 s, no sooner."""
     flight = fly("ardupilot", STARTS[3])
     link, report = flight.node.autopilot_link, flight._report
 
@@ -218,6 +220,14 @@ def test_drone_whose_autopilot_reports_the_ground_in_the_air_is_seen_by_the_othe
         status = own_status(flight.card, link, link.state, 0, flight.node.phase, peers=1)
         assert flight.z > 10.0 and status.is_airborne and flight.node.phase in AIRBORNE_PHASES, flight.log[-3:]
     assert (flight.node.phase == P.LAND) == (ticks == 30)
+
+
+@pytest.mark.parametrize("order", [kind for kind in OrderKind if kind not in (OrderKind.RESUME, OrderKind.PING)])
+def test_no_order_but_resume_lets_a_drone_whose_position_jumped_flock_on(order):
+    flight = fly("px4", [*STARTS[3], ("jumps aside", 10), (order, 60)])
+    assert flight.node.phase not in (P.GATHER, P.FLOCK, P.GOTO), flight.log
+    flight = fly("px4", [*STARTS[3], ("jumps aside", 10), (OrderKind.HOLD, 2), (OrderKind.RESUME, 20)])
+    assert flight.node.phase == P.FLOCK, "its position holds, and somebody has looked"
 
 
 # -------------------------------------------------------------------------------------------------------- limiter

@@ -176,13 +176,13 @@ def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> l
         if getattr(safety, name) < getattr(likely, name):
             notes.append(
                 f"{name} = {getattr(safety, name):g} s is shorter than what the scenario gives a card, "
-                f"{getattr(likely, name):g} s: distances to stop are told too short, unless the drones are as quick"
+                f"{getattr(likely, name):g} s: distances to stop come out too short, unless the drones are as quick"
             )
     for name in ("accel", "brake"):
         if getattr(safety, name) > likely.accel:
             notes.append(
                 f"{name} = {getattr(safety, name):g} m/s^2 is more than what the scenario gives a card, "
-                f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
+                f"{likely.accel:g} m/s^2: distances to stop come out too short, unless the drones are as quick"
             )
     return notes
 

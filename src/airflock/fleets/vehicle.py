@@ -390,7 +390,7 @@ class SoftwareVehicle:
         return bool(self.prearm_error()) if name == "prearm" else self.running_for >= FIRST_SENT.get(name, 0.0)
 
     def reboot(self) -> None:
-        """Start anew now: disarmed, without clock and position for a while; parameters are kept."""
+        """Reboot now: disarmed, without clock and position for a while; parameters are kept."""
         self._rebooted_at = self.booted_at = self.now
         self.in_fail_safe = False
         self.mode, self.armed, self.is_taking_off, self.heartbeat_at = FIRST_MODES[self.kind], False, False, None

@@ -82,7 +82,7 @@ class ParameterCheck(NamedTuple):
         """Return the least and the largest value that is safe for a member of a flock."""
         return (float(member), float(member)) if self.own else (self.low, self.high)
 
-    def told(self, member: int | None = None) -> str:
+    def safe_values(self, member: int | None = None) -> str:
         """Describe the safe values in words: those of one member, or of all."""
         if self.own and member is None:
             return "to the own system id"
@@ -94,9 +94,9 @@ class ParameterCheck(NamedTuple):
     def instruction(self) -> str:
         """Return names and safe values in words, for a person who sets them: each name in its own unit."""
         if self.later_unit == 1.0:
-            return f"{' or '.join(self.names)} {self.told()}"
-        later = [f"{name} {self.as_reported({name: 0.0}).told()}" for name in self.later_names]
-        return f"{self.name} {self.told()} (Copter 4.7: {', '.join(later)})"
+            return f"{' or '.join(self.names)} {self.safe_values()}"
+        later = [f"{name} {self.as_reported({name: 0.0}).safe_values()}" for name in self.later_names]
+        return f"{self.name} {self.safe_values()} (Copter 4.7: {', '.join(later)})"
 
     def safe(self, value: float, member: int) -> bool:
         """Return True if a value is safe for a member of a flock."""

@@ -71,10 +71,12 @@ class MissionFacts(NamedTuple):
     kill_confirmed: bool = False  # the operator confirmed a kill
     resume_ordered: bool = False  # RESUME was ordered and not yet followed
     held: bool = False  # HOLD was ordered: only an order ends it
+    needs_resume: bool = False  # the position jumped: the operator has to look first
     position_bad_for: float = 0.0
     gnss_bad_for: float = 0.0
-    landed_for: float = 0.0  # in a phase in which it should fly
+    landed_for: float = 0.0  # without moving, in a phase in which it should fly or land
     bad_streams: tuple[str, ...] = ()  # streams of the autopilot that are too slow or silent, a line each
+    silent_streams_for: float = 0.0
     battery_critical: bool = False
     battery_needed_home: bool = False  # just enough is left for the way home
     outside_for: float = 0.0
@@ -135,6 +137,8 @@ def _phases(*phases: MissionPhase) -> frozenset[MissionPhase]:
 
 
 LANDED_TIME = 1.0  # s; a drone that is on the ground for longer does not fly, whatever its phase says
+HIGH_LANDED_TIME = 5.0  # s; our choice: the same where its height says that it flies; it may stand on a roof
+SILENT_RETURN_TIME = 10.0  # s; our choice: without SYS_STATUS nobody knows how long it can still fly
 _P = MissionPhase
 PHASES_BEFORE_RETURN = _phases(_P.TAKEOFF, _P.GATHER, _P.FLOCK, _P.GOTO)
 
@@ -193,7 +197,7 @@ MISSION_TABLE: tuple[Row, ...] = (
         "29",
         FLYING_PHASES - {_P.TAKEOFF},
         "stands on the ground",
-        lambda f, s: f.landed_for > LANDED_TIME,
+        lambda f, s: f.landed_for > (HIGH_LANDED_TIME if f.is_high and f.position_bad_for == 0.0 else LANDED_TIME),
         _P.LAND,
     ),
     Row("5b", FLYING_PHASES, "no position for too long", lambda f, s: f.position_bad_for > s.stale_land, _P.LAND),
@@ -206,6 +210,13 @@ MISSION_TABLE: tuple[Row, ...] = (
         "streams of the autopilot are too slow or silent",
         lambda f, s: bool(f.bad_streams),
         _P.HOLD,
+    ),
+    Row(
+        "30b",
+        _phases(_P.HOLD),
+        "a stream of the autopilot is silent for too long",
+        lambda f, s: f.silent_streams_for > SILENT_RETURN_TIME and f.has_navigation,
+        _P.RETURN,
     ),
     Row("7", FLYING_PHASES, "the battery is critical", lambda f, s: f.battery_critical, _P.LAND),
     Row(
@@ -354,6 +365,7 @@ MISSION_TABLE: tuple[Row, ...] = (
         "ordered to a point",
         lambda f, s: (
             f.order == OrderKind.GOTO
+            and not f.needs_resume
             and f.has_good_navigation
             and f.is_high
             and not f.is_landed
@@ -382,7 +394,7 @@ MISSION_TABLE: tuple[Row, ...] = (
         "27",
         _phases(_P.LAND),
         "landed",
-        lambda f, s: not f.armed or (f.is_landed and f.in_land_mode and f.has_flown and not f.is_high),
+        lambda f, s: not f.armed or (f.landed_for > LANDED_TIME and f.in_land_mode and f.has_flown and not f.is_high),
         _P.DONE,
     ),
 )

@@ -24,7 +24,7 @@ from airflock.drones.mavlink.signing import PacketReceiver, PacketSigner
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import FLYING_PHASES, NOT_FLOCKING_PHASES, MissionFacts, MissionPhase, next_step
 from airflock.drones.onboard.peers import ORDER_REFUSALS, AutopilotLink, OperatorOrders, Peers
-from airflock.drones.onboard.situation import ConditionTimers, NodeTick, mission_facts
+from airflock.drones.onboard.situation import ConditionTimers, NodeTick, explain_clock_offset, mission_facts
 from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseVelocity, SteeringInput, Velocity
 
 ORIGIN_MESSAGE = 49
@@ -66,9 +66,10 @@ def own_status(
 
 QUANTITY = re.compile(r"[-+]?\d+(\.\d+)? (?=Hz|m|km|s|V|%)")
 RETRY_PERIOD = 1.0  # s between two tries of a command
-KILL_SECONDS = 3.0  # s at least for which a kill is repeated to an autopilot that is armed
+STOP_SECONDS = 3.0  # s for which the motors must be reported off: a heartbeat may be a second old
 MAX_UNSENT_LINES = 64  # lines for a person that wait for the radio
 PREFLIGHT_PHASES = frozenset({MissionPhase.BOOT, MissionPhase.READY, MissionPhase.CLEARED})
+STANDING_PHASES = PREFLIGHT_PHASES | {MissionPhase.DONE}
 
 
 class NodeMemory(NamedTuple):
@@ -130,6 +131,7 @@ class Node:
         self._last_tick, self._next_status = now, [now] * len(self._radio_periods)
         self._takeoff_at: float | None = None
         self._stream_since: float | None = None
+        self._stop_since: float | None = None  # time at which the motors were ordered off, s
         self._command_at, self._heartbeat_at, self._request_at = -1e9, -1e9, -1e9
         self._restarts, self._has_flown = 0, False
         self._overdue: list[int] = []  # streams of the autopilot that are not heard
@@ -241,13 +243,14 @@ class Node:
             # The row that fired has changed the phase, and the order would be lost with this tick:
             # give it to the next one.
             if known.order in orders.CALL_OFF_ORDERS and step.row.number != "23" and self.phase in FLYING_PHASES:
-                self.operator.again(known.order)  # something else came first at this tick
+                self.operator.put_back(known.order)  # something else came first at this tick
         # RETURN has ended `held`: without this the drone would flock on once it knows its place again.
         elif known.order == OrderKind.RETURN and self.phase == MissionPhase.HOLD:
             self.operator.held = True
             self._notes.append("not returned: it does not know its position; it holds until the operator orders more")
         if known.order == OrderKind.GOTO and self.phase != MissionPhase.GOTO:
-            self._notes.append(f"the point that was ordered is not followed in {self.phase.name}")
+            why = ": its position jumped; look where it is, then resume" if self.operator.needs_resume else ""
+            self._notes.append(f"the point that was ordered is not followed in {self.phase.name}{why}")
         # A resume must not be followed minutes later, once the pilot has taken off.
         if known.resume_ordered and self.phase == MissionPhase.MANUAL and (known.is_landed or not known.is_high):
             self.operator.resume_ordered = False
@@ -277,7 +280,7 @@ class Node:
         # After a step of the estimate both positions of the autopilot agree again, at a place that may
         # be the wrong one (measured: 22 m off, 5 s after a disturbed GNSS): only a person can see it.
         if self.phase in FLYING_PHASES and not self.operator.held and self.autopilot_link.is_position_doubtful(now):
-            self.operator.held = True
+            self.operator.held = self.operator.needs_resume = True
             self._notes.append("the position jumped: holds until the operator resumes; compare its place with the map")
         order = self.operator.next_order()
         if self.phase in PREFLIGHT_PHASES and self.operator.missed(self.utc(now), self.card.turn(self.member)):
@@ -308,6 +311,7 @@ class Node:
             phase_for=now - self._phase_since,
             time_over=self._takeoff_at is not None and now - self._takeoff_at > s.mission_time,
         )
+        explain_clock_offset(self.card, self.autopilot_link, self.peers, now)
         return mission_facts(self.card, self.member, self.autopilot_link, self.peers, self.operator, self._timers, tick)
 
     def _is_goal_outside(self) -> bool:
@@ -326,12 +330,15 @@ class Node:
             self._phase_before_hold, self.operator.held, self.operator.resume_ordered = MissionPhase.FLOCK, True, False
         if to == MissionPhase.ARMING:
             assert self.autopilot_link.state is not None
-            self.operator.held = self.operator.resume_ordered = False
+            self.operator.held = self.operator.resume_ordered = self.operator.needs_resume = False
             self.home = (self.autopilot_link.state.x, self.autopilot_link.state.y, self.card.layer(self.member))
         if was not in PREFLIGHT_PHASES and to == MissionPhase.READY:
             self.operator.start_at = None
-            if was == MissionPhase.ARMING:
-                out.autopilot.append(self._speaker.arm(False))
+        # It may be armed already, or still spin after its landing: it is switched off as it was on.
+        if (was, to) == (MissionPhase.ARMING, MissionPhase.READY) or (
+            to == MissionPhase.DONE and was != MissionPhase.MANUAL and self.autopilot_link.armed
+        ):
+            self._stop_since = now
         if was == MissionPhase.ARMING and to == MissionPhase.TAKEOFF:
             self._takeoff_at, self._overload_count = now, 0
             self.autopilot_link.accepted.discard(TAKE_OFF_COMMAND)
@@ -365,13 +372,7 @@ class Node:
     def _steer(self, now: float, mission_facts: MissionFacts, out: NodeOutput) -> None:
         """Send the autopilot the setpoint or the mode of the phase, or nothing."""
         phase, say = self.phase, self._speaker
-        if phase == MissionPhase.DONE and self.operator.kill_confirmed:
-            # Once at least, even if the autopilot seems disarmed: its last heartbeat may be a
-            # second old.
-            if (mission_facts.armed or now == self._phase_since) and self._may_retry(now):
-                out.autopilot.append(say.arm(False, force=True))
-            elif not mission_facts.armed and now - self._phase_since > KILL_SECONDS:
-                self.operator.kill_confirmed = False  # armed later, it starts another flight
+        self._stop_motors(now, mission_facts, out)
         if phase == MissionPhase.LAND and not mission_facts.in_land_mode and self._may_retry(now):
             out.autopilot.append(say.set_mode(self.card.autopilot.land))
         # PX4 leaves its mode when setpoints end, so they go on in every phase in which we fly, and
@@ -411,6 +412,20 @@ class Node:
         stands = mission_facts.is_landed and phase != MissionPhase.TAKEOFF
         self.command = NO_VELOCITY if own is None or stands else self._phase_velocity.velocity(own, at)
         out.autopilot.append(say.velocity(self.command, round(now * 1e3)))
+
+    def _stop_motors(self, now: float, mission_facts: MissionFacts, out: NodeOutput) -> None:
+        """Order the motors off, once at least and until they are off; not those of a pilot, unless it is a kill."""
+        kills = self.phase == MissionPhase.DONE and self.operator.kill_confirmed
+        if kills and self._stop_since is None:
+            self._stop_since = now
+        if self._stop_since is None:
+            return
+        is_ours = self.phase in STANDING_PHASES and (mission_facts.in_guided_mode or mission_facts.in_land_mode)
+        is_over = not mission_facts.armed and now - self._stop_since > STOP_SECONDS
+        if is_over or not (kills or is_ours):
+            self._stop_since, self.operator.kill_confirmed = None, False  # armed later, it starts another flight
+        elif (mission_facts.armed or now == self._stop_since) and self._may_retry(now):
+            out.autopilot.append(self._speaker.arm(False, force=kills))
 
     def _climb_height(self) -> float:
         """Return the height of the own layer above the ground, m."""

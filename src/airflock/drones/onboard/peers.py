@@ -149,6 +149,8 @@ class OperatorOrders:
     """Orders that were taken.
 
     last_order_time : time at which the last order was given, µs of Unix time; kept over restarts against replays
+    held            : HOLD was ordered, or its position jumped: only an order ends it
+    needs_resume    : its position jumped, and no RESUME was ordered since
     """
 
     def __init__(self, card: FlightCard, member: int, last_order_time: int):
@@ -157,7 +159,7 @@ class OperatorOrders:
         self.refused = dict.fromkeys(ORDER_REFUSALS, 0)
         self.last_refusal = ""  # reason of the last refused order
         self.start_at: int | None = None  # µs of Unix time
-        self.held = self.resume_ordered = self.kill_confirmed = False
+        self.held = self.resume_ordered = self.needs_resume = self.kill_confirmed = False
         self.goal: tuple[float, float, float] | None = None
         self._kill_at = -KILL_CONFIRM_WITHIN
         self._queue: list[OrderKind] = []
@@ -193,7 +195,7 @@ class OperatorOrders:
         elif order.kind == OrderKind.HOLD:
             self.held, self.resume_ordered = True, False
         elif order.kind == OrderKind.RESUME:
-            self.held, self.resume_ordered = False, True
+            self.held, self.resume_ordered, self.needs_resume = False, True, False
         elif order.kind == OrderKind.GOTO:
             lat, lon, alt = order.point
             self.goal = self._card.site.local(lat * 1e-7, lon * 1e-7, alt * 1e-3)
@@ -212,7 +214,7 @@ class OperatorOrders:
         """Return the order of this tick; orders keep the sequence of their arrival."""
         return self._queue.pop(0) if self._queue else None
 
-    def again(self, order: OrderKind) -> None:
+    def put_back(self, order: OrderKind) -> None:
         """Put an order back for the next tick, because something else came first at this one."""
         self._queue.insert(0, order)
 
@@ -295,7 +297,7 @@ class AutopilotLink:
         self._state_times: deque[float] = deque(maxlen=32)
         self.far = 0.0
         self._max_jump = 5.0
-        self._boot_ms = 0
+        self._boot_ms, self._may_reboot_silently, self._is_reboot_assumed = 0, True, False
 
     def __call__(self, data: bytes, now: float, utc: int, max_jump: float) -> None:
         """Take bytes at now (s) and utc (µs of Unix time); max_jump: largest plausible step (m)."""
@@ -320,12 +322,14 @@ class AutopilotLink:
         """Return the messages that are not heard, or no longer; all that it knew is forgotten if none is heard.
 
         An autopilot that reboots forgets the requested streams and sends heartbeats only: no
-        message with its time since boot would say so.
+        message with its time since boot would say so. Where such a silence was none, because that
+        time went on after it, silence proves nothing, and only a time that goes back does.
         """
         overdue = [n for n in STREAM_RATES if now - self.arrivals.get(n, -1e9) > STREAM_SILENCE]
-        alive = now - self.heartbeat_at <= STREAM_SILENCE
-        if len(overdue) == len(STREAM_RATES) and self.arrivals and alive and not self.armed:
-            self._forget(0)
+        is_silent = len(overdue) == len(STREAM_RATES) and now - self.heartbeat_at <= STREAM_SILENCE
+        if is_silent and self._may_reboot_silently and self.arrivals and not self.armed:
+            self._is_reboot_assumed = True
+            self._forget(self._boot_ms)
         return overdue
 
     def low_rate(self, needed: float, now: float) -> float | None:
@@ -350,8 +354,11 @@ class AutopilotLink:
 
         since_boot : time since boot in a message, ms; a step back by more than REBOOT_MS means a reboot
         """
+        goes_on = since_boot >= self._boot_ms - REBOOT_MS
+        if self._is_reboot_assumed:
+            self._is_reboot_assumed, self._may_reboot_silently, self._boot_ms = False, not goes_on, since_boot
         # In the air a time that goes back is a broken message, never a reason to forget the state.
-        if since_boot >= self._boot_ms - REBOOT_MS:
+        elif goes_on:
             self._boot_ms = max(since_boot, self._boot_ms)
         elif not self.armed:
             self._forget(since_boot)

@@ -12,6 +12,7 @@ from airflock.drones.onboard.mission import FLYING_PHASES, MissionFacts, Mission
 from airflock.drones.onboard.peers import (
     AGE_COUNT,
     HEARD_WITHIN,
+    MOVING_SPEED,
     STREAM_SILENCE,
     AutopilotLink,
     OperatorOrders,
@@ -33,6 +34,7 @@ NO_HEARTBEAT_TEXT = (
 # was up to 1.1 s; a computer that is farther off would obey no order soon.
 MAX_EXPLAINED = 2.5
 GATHERED_PHASES = (MissionPhase.GATHER, MissionPhase.FLOCK, MissionPhase.GOTO, MissionPhase.HOLD)
+LANDED_PHASES = FLYING_PHASES - {MissionPhase.TAKEOFF} | {MissionPhase.LAND}  # those in which it counts
 LEAVING_PHASES = frozenset({MissionPhase.RETURN, MissionPhase.LAND, MissionPhase.DONE})
 
 
@@ -76,22 +78,26 @@ class ConditionTimers:
         return max(now - self._since.setdefault(name, now), 1e-9)
 
 
-def bad_streams(card: FlightCard, link: AutopilotLink, now: float) -> tuple[str, ...]:
-    """Return the streams of the autopilot that are too slow or silent, one line each; not those never heard."""
-    # A state for each tick and each packet; a faster one is not needed.
-    needed = min(POSITION_RATE, 1.0 / max(card.safety.tick, card.safety.status_period))
-    rate = link.low_rate(needed, now)
-    lines = [
+def silent_streams(link: AutopilotLink, now: float) -> tuple[str, ...]:
+    """Return the streams of the autopilot that have ended, one line each; not those never heard."""
+    return tuple(
         f"{common_dialect().mavlink_map[number].msgname}: the autopilot has sent none for {MAX_STREAM_AGE:g} s"
         for number in STREAM_RATES
         if now - link.arrivals.get(number, now) > MAX_STREAM_AGE
-    ]
-    if rate is not None:
-        lines.append(
-            f"own position at {rate:.1f} Hz, {needed:g} needed: is MAVProxy between? Start it with --streamrate=-1; "
-            "other ground stations and the SRn_ (Copter 4.7: MAVn_) parameters set such rates, too"
-        )
-    return tuple(lines)
+    )
+
+
+def slow_streams(card: FlightCard, link: AutopilotLink, now: float) -> tuple[str, ...]:
+    """Return one line if the own position comes too seldom, or none."""
+    # A state for each tick and each packet; a faster one is not needed.
+    needed = min(POSITION_RATE, 1.0 / max(card.safety.tick, card.safety.status_period))
+    rate = link.low_rate(needed, now)
+    if rate is None:
+        return ()
+    return (
+        f"own position at {rate:.1f} Hz, {needed:g} needed: is MAVProxy between? Start it with --streamrate=-1; "
+        "other ground stations and the SRn_ (Copter 4.7: MAVn_) parameters set such rates, too",
+    )
 
 
 def missing_before_start(
@@ -108,7 +114,8 @@ def missing_before_start(
     missing += (
         _missing_parameters(card, member, link) + _missing_state(card, link, now) + _missing_clock(card, link, peers)
     )
-    return (*missing, *bad_streams(card, link, now), *_missing_peers(card, link, peers, now))
+    streams = silent_streams(link, now) + slow_streams(card, link, now)
+    return (*missing, *streams, *_missing_peers(card, link, peers, now))
 
 
 def _missing_parameters(card: FlightCard, member: int, wire: AutopilotLink) -> list[str]:
@@ -121,7 +128,7 @@ def _missing_parameters(card: FlightCard, member: int, wire: AutopilotLink) -> l
             continue
         if not guard.safe(value, member):
             why = guard.reason(card.safety.speed_max, card.safety.response + card.safety.delay)
-            missing.append(f"{guard.name} = {value:g} is not {guard.told(member)}: {why}")
+            missing.append(f"{guard.name} = {value:g} is not {guard.safe_values(member)}: {why}")
     return missing
 
 
@@ -142,11 +149,14 @@ def _missing_state(card: FlightCard, wire: AutopilotLink, now: float) -> list[st
         missing.append(f"the drone is {card.outside(*own[:3]):.0f} m outside the fence: is the card's site right?")
     elif abs(own.z) > s.uneven:
         missing.append(
-            f"the drone stands {abs(own.z):.1f} m {'above' if own.z > 0.0 else 'below'} the card's site, by which all "
-            f"heights are told; at most {s.uneven:g} m (safety.uneven): is the site's altitude above mean sea level?"
+            f"the drone stands {abs(own.z):.1f} m {'above' if own.z > 0.0 else 'below'} the card's site, from which "
+            f"all heights count; at most {s.uneven:g} m (safety.uneven): is the site's altitude above mean sea level?"
         )
     elif wire.position_disagreement(now) > s.jump:
         missing.append(f"local and global position of the autopilot differ by {wire.position_disagreement(now):.0f} m")
+    # The local position alone cannot contradict itself.
+    elif wire.global_state is None:
+        missing.append("GLOBAL_POSITION_INT: the autopilot has not sent it, so its local position cannot be compared")
     # Its streams may go on without it, through a router; a start would then end at once.
     if now - wire.heartbeat_at > MAX_HEARTBEAT_AGE:
         missing.append(NO_HEARTBEAT_TEXT)
@@ -156,7 +166,7 @@ def _missing_state(card: FlightCard, wire: AutopilotLink, now: float) -> list[st
         accuracy = f"accuracy {min(wire.horizontal_accuracy, 999.0):.1f} m"
         missing.append(f"navigation: fix {wire.fix_type}, {accuracy}; needs a 3-D fix and {s.h_acc:g} m")
     if wire.battery is None or wire.battery <= s.battery_low:
-        charge = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
+        charge = "unknown" if wire.battery is None else f"{wire.battery:.0f} %"
         missing.append(f"battery: {charge}; needs more than {s.battery_low:g} %")
     if wire.battery_warning:
         missing.append(wire.battery_warning)
@@ -176,7 +186,7 @@ def _missing_clock(card: FlightCard, wire: AutopilotLink, peers: Peers) -> list[
         return [
             f"clock: {offset:+.2f} s off the autopilot's; at most {card.safety.clock_error:g} s, or {MAX_EXPLAINED:g} "
             "s while the clocks of all other drones agree with this computer's; set this computer's clock, then "
-            "start the node anew"
+            "restart the node"
         ]
     return ["clock: it differs from the clocks of all others"] if peers.is_own_clock_suspect() else []
 
@@ -227,7 +237,7 @@ def mission_facts(
     timers: ConditionTimers,
     tick: NodeTick,
 ) -> MissionFacts:
-    """Return all facts that the mission table uses, at one tick."""
+    """Return all facts that the mission table uses, at one tick; only the timers remember something of it."""
     s, own, now, phase = card.safety, link.state, tick.now, tick.phase
     alive = now - link.heartbeat_at <= MAX_HEARTBEAT_AGE
     flying = peers.flying()
@@ -237,13 +247,13 @@ def mission_facts(
     position_bad = timers("position", not now - link.state_at <= s.stale or not alive, now)
     gnss_bad = timers("gnss", _is_gnss_bad(card, link, now), now)
     few = timers("few", peers.heard(now) < expected, now)
-    explain_clock_offset(card, link, peers, now)
     clock_bad = timers("clock", _is_clock_bad(card, link, peers), now)
     out = own is not None and phase in FLYING_PHASES and card.outside(*own[:3]) > 0.0
     near = own is not None and _is_anybody_near(own, fresh.values(), s.near)
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
     # Hysteresis: HOLD ends only after all reasons have been absent for a while (row 25).
-    streams = bad_streams(card, link, now)
+    silent = silent_streams(link, now)
+    streams = silent + slow_streams(card, link, now)
     reasons_to_hold = {
         "no valid position": position_bad,
         "bad navigation": gnss_bad,
@@ -256,9 +266,14 @@ def mission_facts(
         "slow or silent streams": streams and tick.phase_before_hold != MissionPhase.RETURN,
     }
     calm = not any(reasons_to_hold.values())
-    # What was said of the ground before its stream ended need not hold.
+    # What was reported of the ground before its stream ended need not hold.
     landed = link.is_landed if now - link.arrivals.get(LANDED_MESSAGE, now) <= STREAM_SILENCE else None
-    stands = landed is True and phase in FLYING_PHASES and phase != MissionPhase.TAKEOFF
+    is_high = own is None or own.z > card.low - LAYER_TOLERANCE
+    # Land detectors err, as in a descent: one that moves does not stand, and one that is high hardly.
+    is_moving = own is not None and position_bad == 0.0 and norm(*own[3:]) > MOVING_SPEED
+    stands = landed is True and not is_moving and phase in LANDED_PHASES
+    if landed and is_high and position_bad == 0.0 and phase in FLYING_PHASES:
+        landed = None
     missing = (
         missing_before_start(card, member, link, peers, tick.utc, now)
         if phase in (MissionPhase.READY, MissionPhase.CLEARED)
@@ -279,17 +294,19 @@ def mission_facts(
         armed=bool(link.armed),
         is_landed=landed is True,
         is_airborne=landed is False,
-        is_high=own is None or own.z > card.low - LAYER_TOLERANCE,
+        is_high=is_high,
         has_flown=tick.has_flown,
         has_good_navigation=not (position_bad or gnss_bad),
         order=tick.order,
         kill_confirmed=operator.kill_confirmed,
         resume_ordered=operator.resume_ordered,
         held=operator.held,
+        needs_resume=operator.needs_resume,
         position_bad_for=position_bad,
         gnss_bad_for=gnss_bad,
         landed_for=timers("landed", stands, now),
         bad_streams=streams,
+        silent_streams_for=timers("streams", bool(silent), now),
         battery_critical=battery < s.battery_critical,
         battery_needed_home=bool(link.battery_warning) or battery < s.battery_low + s.battery_way * way * 1e-3,
         outside_for=timers("outside", out, now),

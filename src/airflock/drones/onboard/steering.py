@@ -168,12 +168,12 @@ class ResponseWatch:
     """
 
     def __init__(self, safety: SafetyLimits):
-        self._safety, self._since, self._last, self._said = safety, 0.0, 0.0, False
+        self._safety, self._since, self._last, self._is_reported = safety, 0.0, 0.0, False
         self._commands: deque[tuple[float, Velocity]] = deque()
         self._drones: list[PredictedVelocity] = []
 
     def reset(self) -> None:
-        """Begin anew: the drone does not fly the law."""
+        """Forget all: the drone does not fly the law."""
         self._drones.clear()
         self._commands.clear()
 
@@ -183,7 +183,7 @@ class ResponseWatch:
         if not self._drones:
             self._since = self._last = now
             half = s.delay + 0.5 * s.response, 1.5 * s.response, 0.5 * s.accel
-            self._drones = [PredictedVelocity(*said, own) for said in ((s.delay, s.response, s.accel), half)]
+            self._drones = [PredictedVelocity(*promised, own) for promised in ((s.delay, s.response, s.accel), half)]
         for drone in self._drones:
             drone.step(own, self._commands, now, min(now - self._last, 0.5 * s.response))
         self._last = now
@@ -192,9 +192,9 @@ class ResponseWatch:
             self._commands.popleft()
         error, other = (drone.squared_error for drone in self._drones)
         watched = now - self._since > 2.0 * RESPONSE_TIME and error > MIN_RESPONSE_ERROR**2
-        if self._said or not watched or other > SLOWER_WINS * error:
+        if self._is_reported or not watched or other > SLOWER_WINS * error:
             return ""
-        self._said = True
+        self._is_reported = True
         return (
             f"the drone answers later than the card says ({s.delay:g} s, then {s.response:g} s at most {s.accel:g} "
             f"m/s^2): {error**0.5:.1f} m/s off, and {other**0.5:.1f} m/s off one that is half as quick; its distances "
