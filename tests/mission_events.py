@@ -215,7 +215,8 @@ class Flight:
 
     def _check(self, was, stood):
         """Check the phase after a tick."""
-        phase, seen = self.node.phase, not self.blind
+        phase, low = self.node.phase, self.card.low
+        seen = not self.blind and (not self.lying or self.z > low)
         self.is_armed_by_pilot &= self.armed
         stands = phase in (P.READY, P.CLEARED, P.DONE) and self.z == 0.0 and self.mode != self.card.autopilot.hold
         spins = stands and self.armed and not self.is_armed_by_pilot and not self.deaf

@@ -819,7 +819,7 @@ def test_a_node_needs_neither_numpy_nor_numba_nor_pydantic_nor_typer(tmp_path):
         "--autopilot",
         "udp:127.0.0.1:39411",
         "--radio",
-        "udp:127.0.0.1:39412",
+        "udp:127.0.0.1:39412>127.0.0.1:39413",
         "--check",
     ]
     done = subprocess.run([sys.executable, "-c", ALONE, *given], capture_output=True, text=True, cwd=tmp_path)

@@ -74,6 +74,7 @@ def test_a_client_joins_where_a_vehicle_calls():
     found = scenario(1)
     made, client = compare.software_card(found, realtime=True), UdpPort(UdpAddresses((LOCAL_HOST, 0), None))
     ports, now = FleetPorts.open(1, client.here), time.monotonic()
+    client.answer(bool, lambda line: None)
     plan = RealtimePlan(found, made, 0, None, (), ports, [now, now + 60.0, 0.0], [0.0] * 4, 1_800_000_000_000_000)
 
     async def joined():

@@ -56,6 +56,50 @@ def test_a_flood_is_read_in_portions(port, monkeypatch):
     assert portions == [list(range(10)), list(range(10, 20)), list(range(20, 25)), []]
 
 
+@pytest.fixture
+def others():
+    """Three processes of this computer that may send to a port."""
+    made = [UdpPort(UdpAddresses((HOST, 0), None)) for _ in range(3)]
+    yield made
+    for each in made:
+        each.close()
+
+
+def test_port_of_an_autopilot_answers_the_first_that_speaks_as_it_until_that_is_silent(port, others, monkeypatch):
+    """Nobody else can draw its commands to itself, nor be read as the autopilot."""
+    autopilot, rival, stranger = others
+    notes, ours, junk = [], b"a heartbeat", b"\xfd or anything"
+    port.answer(lambda data: data == ours, notes.append)
+    assert not port.write(b"nobody is there")
+
+    def arrives(sender, data):
+        sender.send(data, port.here)
+        return data in port.read() and port.write(b"answer")
+
+    assert not arrives(stranger, junk) and not notes
+    assert arrives(autopilot, ours) and autopilot.read() == [b"answer"] and not stranger.read()
+    for _ in range(3):
+        assert not arrives(rival, ours) and not arrives(stranger, junk)
+        assert arrives(autopilot, junk) and len(autopilot.read()) == 1
+    assert not rival.read() and not stranger.read()
+    assert [note.split(" ", 1)[1] for note in notes[1:]] == ["speaks as this autopilot, too: nothing of it is read"]
+    later = time.monotonic() + node_program.PARTNER_SILENCE + 0.1
+    monkeypatch.setattr(node_program.time, "monotonic", lambda: later)  # it has restarted meanwhile
+    assert arrives(rival, ours) and rival.read() == [b"answer"]
+    assert not arrives(autopilot, ours) and not autopilot.read()
+    assert notes[-1] == "the autopilot is heard from {}:{}; commands go there".format(*rival.here)
+
+
+def test_port_with_a_destination_sends_there_whatever_arrives(others):
+    partner, rival, _ = others
+    with_destination = UdpPort(UdpAddresses((HOST, 0), partner.here))
+    with_destination.answer(lambda data: True, lambda note: None)
+    rival.send(b"a heartbeat", with_destination.here)
+    assert with_destination.read() == [b"a heartbeat"] and with_destination.write(b"answer")
+    assert partner.read() == [b"answer"] and not rival.read()
+    with_destination.close()
+
+
 def test_while_somebody_floods_a_port_a_life_goes_on(port):
     over, ticks = threading.Event(), 5
 

@@ -14,11 +14,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, Protocol, TextIO, TypeVar
 
-from airflock.drones.mavlink.frames import FrameStream
+from airflock.drones.mavlink.frames import FrameStream, frames_in
 from airflock.drones.mavlink.signing import read_key
 from airflock.drones.onboard.card import FlightCard, read_card
 from airflock.drones.onboard.flight_log import LoggingNode, memory_json, read_node_memory
 from airflock.drones.onboard.node import Node, NodeOutput
+from airflock.drones.onboard.peers import AUTOPILOT_COMPONENT
 from airflock.support import AirflockError, CardError, LinkError, atomic, collect_errors
 
 termios: Any
@@ -30,6 +31,7 @@ except ImportError:  # Windows
 PORT_FORMS = "give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD"
 MAX_DATAGRAM = 2048  # bytes read at once
 MAX_DATAGRAMS = 1000  # datagrams read at one look; what a flood brings beyond waits, or is lost as on a jammed radio
+PARTNER_SILENCE = 3.0  # s; our choice: an autopilot whose address changes has restarted, and was silent for longer
 RECEIVE_BUFFER = 1 << 20  # bytes that wait unread in a socket, as far as the system allows
 
 
@@ -100,10 +102,12 @@ def _address(address: str, text: str) -> tuple[str, int]:
 
 
 class UdpPort:
-    """A UDP socket."""
+    """A UDP socket. Without a destination it sends nothing, until `answer` or `aim` says where to."""
 
     def __init__(self, addresses: UdpAddresses):
-        self._destination = addresses.destination
+        self._destination, self._partner_at, self._has_rival = addresses.destination, -1e9, False
+        self._is_partner: Callable[[bytes], bool] | None = None
+        self._notify: Callable[[str], None] = lambda line: None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
@@ -113,7 +117,6 @@ class UdpPort:
         except OSError:
             self._socket.close()
             raise
-        self._answers_last_sender = addresses.destination is None
 
     @property
     def here(self) -> tuple[str, int]:
@@ -126,8 +129,32 @@ class UdpPort:
         return self._socket.fileno()
 
     def aim(self, there: tuple[str, int]) -> None:
-        """Send to this address from now on, whatever arrives."""
-        self._destination, self._answers_last_sender = there, False
+        """Send to this address from now on."""
+        self._destination = there
+
+    def answer(self, is_partner: Callable[[bytes], bool], notify: Callable[[str], None]) -> None:
+        """Where no destination is known, answer whose datagrams `is_partner` accepts, and read nobody else's."""
+        if self._destination is None:
+            self._is_partner, self._notify = is_partner, notify
+
+    def _counts(self, data: bytes, sender: tuple[str, int]) -> bool:
+        """Return True if a datagram is to be read; note once where the partner is, and who else speaks as it."""
+        if self._is_partner is None:
+            return True
+        # MAVLink on this wire is not signed: any process of the network may send here. So the first
+        # partner keeps the link until it is silent.
+        now, address = time.monotonic(), "{}:{}".format(*sender)
+        if sender != self._destination and self._is_partner(data):
+            if now - self._partner_at > PARTNER_SILENCE:
+                self._notify(f"the autopilot is heard from {address}; commands go there")
+                self._destination = sender
+            elif not self._has_rival:
+                self._has_rival = True
+                self._notify(f"{address} speaks as this autopilot, too: nothing of it is read")
+        if sender == self._destination:
+            self._partner_at = now
+        # While it is silent others are read: a wrong system id would never be noticed otherwise.
+        return sender == self._destination or now - self._partner_at > PARTNER_SILENCE
 
     def read(self) -> list[bytes]:
         """Return the datagrams that have arrived."""
@@ -142,9 +169,7 @@ class UdpPort:
                 datagrams.append(take(MAX_DATAGRAM))
             except OSError:  # nothing more has arrived, or the network is down
                 break
-        if self._answers_last_sender and datagrams:
-            self._destination = datagrams[-1][1]
-        return datagrams
+        return [(data, sender) for data, sender in datagrams if self._counts(data, sender)]
 
     def write(self, data: bytes) -> bool:
         """Send a datagram."""
@@ -352,18 +377,13 @@ def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, l
     for text in (arguments.autopilot, *arguments.radio):
         with collect_errors(errors):
             ports.append(open_port(text))
+            # It could answer only who sends to it: any process could draw the packets of this drone to itself.
+            if text in arguments.radio and text.startswith("udp:") and ">" not in text:
+                errors.append(f"--radio {text}: nobody would hear this drone; write {text}>HOST:PORT")
     if errors or card is None:
         for port in ports:
             port.close()
         raise CardError(errors)
-    for text in arguments.radio:
-        # A port without a destination answers the first sender: two such ports wait for each
-        # other for ever.
-        if text.startswith("udp:") and ">" not in text:
-            sys.stderr.write(
-                f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
-                f"first, write {text}>HOST:PORT\n"
-            )
     return card, key, ports
 
 
@@ -433,6 +453,11 @@ def run_node(
     def notify(note: str) -> None:
         write_line(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
 
+    def speaks_as_member(data: bytes) -> bool:
+        return any(frame.system == member and frame.component == AUTOPILOT_COMPONENT for frame in frames_in(data))
+
+    if isinstance(ports[0], UdpPort):
+        ports[0].answer(speaks_as_member, notify)
     try:
         ticks = run_alone(tick_task(logged, ports, s.tick, notify, has_ended, save))
     finally:

@@ -272,8 +272,7 @@ def mission_facts(
     # Land detectors err, as in a descent: one that moves does not stand, and one that is high hardly.
     is_moving = own is not None and position_bad == 0.0 and norm(*own[3:]) > MOVING_SPEED
     stands = landed is True and not is_moving and phase in LANDED_PHASES
-    if landed and is_high and position_bad == 0.0 and phase in FLYING_PHASES:
-        landed = None
+    landed = landed and not (is_high and position_bad == 0.0)
     missing = (
         missing_before_start(card, member, link, peers, tick.utc, now)
         if phase in (MissionPhase.READY, MissionPhase.CLEARED)
