@@ -51,7 +51,7 @@ def plain(value):
         return {label(key): plain(one) for key, one in sorted(value.items(), key=lambda item: label(item[0]))}
     if isinstance(value, set | frozenset):
         return sorted(map(plain, value), key=json.dumps)
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple | range):
         return [plain(one) for one in value]
     assert type(value).__module__ == "datetime", f"{type(value)} is no plain value"
     return str(value)

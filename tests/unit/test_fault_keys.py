@@ -1,11 +1,13 @@
 """Keys of faults: in settings and in flight they mean what the file would; what is wrong is one line, all at once."""
 
+import re
+import tracemalloc
+
 import numpy as np
 import pytest
 
 import airflock
 from airflock.engine import fly_world
-from airflock.scenarios import fault_entries
 from airflock.scenarios.files import load
 from airflock.support.errors import ScenarioError
 
@@ -141,11 +143,39 @@ def test_a_spread_is_named_as_it_is_written():
     assert line.startswith("groups[0].model.p_rep.spread = 10 m: the unit is 1/s")
 
 
-def test_faults_of_very_many_agents_are_counted_before_their_lists_are_made(monkeypatch):
+HUGE = {"agents": 1e7, "world.side": 1e6, "metrics.kind": "order", "duration": 1e6}
+ONE = {"kind": "motor", "at": 1.0}
+
+
+@pytest.mark.parametrize(("faults", "groups", "said"), [
+    ([ONE] * 14, [], "14 entries of all 10000000 agents are 140,000,000 agents to look at"),
+    ([ONE | {"group": "a"}] * 14, [{"name": "a"}], "14 entries of all 10000000 agents are 140,000,000 agents"),
+    ([ONE, ONE | {"group": "a"}], [{"name": "a", "agents": "50 %"}], "2 entries of groups or all of 10000000 agents"),
+    ([{"kind": "motor", "per_hour": 1e6}], [], "about 277,777,778 agents to hit within duration = 1e+06 s are more"),
+])  # fmt: skip
+def test_faults_of_very_many_agents_are_counted_before_their_lists_are_made(faults, groups, said):
     """Fourteen entries of all ten million agents are 929 bytes of text, and were 5 GB of numbers."""
-    made = []
-    monkeypatch.setattr(fault_entries, "_read_agents", lambda *given: made.append(given) or (None, []))
-    many = {"agents": 1e7, "world.side": 1e6, "metrics.kind": "order", "faults": [{"kind": "motor", "at": 1.0}] * 14}
-    with pytest.raises(ScenarioError, match="14 entries of all 10000000 agents are 140,000,000 agents to look at"):
-        airflock.load("vicsek_1995/ordered", many)
-    assert not made
+    tracemalloc.start()
+    try:
+        with pytest.raises(ScenarioError, match=re.escape(said)):
+            airflock.load("vicsek_1995/ordered", HUGE | {"faults": faults, "groups": groups})
+        assert tracemalloc.get_traced_memory()[1] < 20e6
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("key", [
+    key.name for key in airflock.keys() if key.kind == "number" and key.unit in ("", "1") and key.high >= 1000.0
+])  # fmt: skip
+def test_no_count_that_is_refused_fills_memory(key):
+    """Neither alone nor beside the largest flock, in groups with faults: all is counted, and nothing listed."""
+    many = HUGE | {"groups": [{"name": "a", "agents": "50 %"}, {"name": "b"}], "faults": [ONE], "world.side": -1.0}
+    declared = next(found for found in airflock.keys() if found.name == key)
+    kind = {} if key.startswith("faults") or not declared.of else {f"{key.partition('.')[0]}.kind": declared.of}
+    tracemalloc.start()
+    try:
+        with pytest.raises(ScenarioError, match="world.side = -1 m"):
+            airflock.load("vicsek_1995/ordered", many | kind | {key.replace("faults.", "faults.0."): declared.high})
+        assert tracemalloc.get_traced_memory()[1] < 20e6
+    finally:
+        tracemalloc.stop()

@@ -102,8 +102,8 @@ def _widest_reach(scenario: Scenario, law: FlownLaw) -> float:
     read = fields_read(law.model.reach, "p")
     reaches = [float(law.model.reach(law.parameters))]
     for group in scenario.groups:
-        # Groups that fly by another law do not widen this one's cells.
-        if group.agents and set(group.agents) <= set(law.agents):
+        # Groups that fly by another law do not widen this one's cells; all agents of a group fly by one.
+        if group.agents and group.agents[0] in law.agents:
             if any(letter == "p" and (read is None or name in read) for letter, name in group.spread):
                 return math.inf
             own = {name: value for (letter, name), value in group.numbers.items() if letter == "p"}

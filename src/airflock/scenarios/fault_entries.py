@@ -15,6 +15,7 @@ from airflock.parts import FAULTS as KINDS
 from airflock.scenarios import schema
 from airflock.scenarios.groups import Group, read_members
 from airflock.scenarios.named_code import build_from_file
+from airflock.scenarios.sections import Flight
 from airflock.scenarios.units import convert_units
 from airflock.support import AirflockError, suggest
 
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 # Refused where agents update in turn: they see each other as they are, so no message exists that a
 # fault could disturb.
 PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
-MOST_AFFECTED = 10_000_000  # agents of all entries that name none: 3 GB of onsets, drawn in half a minute
+MOST_AFFECTED = 10_000_000  # agents of all entries that list none: 3 GB of onsets, drawn in half a minute
+HOUR = 3600.0  # s
 MOST = 255  # entries of a file: each draws by a number of its own
 
 
@@ -60,7 +62,7 @@ class FaultEntry:
 
     fault: Fault
     numbers: Any
-    agents: tuple[int, ...]
+    agents: Sequence[int]
     number: int | None
     at: float | None
     per_hour: float
@@ -73,24 +75,32 @@ class FaultEntry:
         due = self.per_hour > 0.0 if self.at is None else self.at < duration
         return due and self.lasts > 0.0 and self.until > begin and bool(self.agents)
 
+    def expected_onsets(self, duration: float) -> float:
+        """Return how many agents it is expected to hit in a flight of this duration, s."""
+        times = 1.0 if self.at is not None else self.per_hour * min(duration, self.until) / HOUR
+        return times * min(len(self.agents), self.number or len(self.agents))
+
 
 def read_fault_entries(
-    tables: Any, agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None = None, *,
+    tables: Any, flight: Flight, groups: Sequence[Group], folder: Path | None = None, *,
     user_kinds: Mapping[str, Fault] | None = None, trust: bool = False,
 ) -> tuple[tuple[FaultEntry, ...], list[str], list[str]]:  # fmt: skip
     """Read the entries of [[faults]]; return them with notes on converted units and all errors, one line each.
 
     user_kinds : kinds that the caller gives, by name
     """
+    agents, duration, sequential = int(flight.agents), flight.duration, flight.update == "sequential"
     if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(e, Mapping) for e in tables):
         return (), [], ["faults is not a list of tables; write [[faults]]"]
     if len(tables) > MOST:
         return (), [], [f"faults: {len(tables)} entries are more than {MOST}"]
-    wide = sum(not {"agents", "group"} & set(table) for table in tables)
-    if wide * agents > MOST_AFFECTED:  # each would have a list of all, and all of them draw
+    sizes = {group.name: len(group.agents) for group in groups}
+    wide = [sizes.get(str(e["group"]), 0) if "group" in e else agents for e in tables if "agents" not in e]
+    if sum(wide) > MOST_AFFECTED:  # before their onsets are drawn, one by one
+        of = f"all {agents} agents" if set(wide) == {agents} else f"groups or all of {agents} agents"
         return (), [], [
-            f"faults: {wide} entries of all {agents} agents are {wide * agents:,} agents to look at, more than "
-            f"{MOST_AFFECTED:,}; write which agents each may hit (agents or group), or fewer entries"
+            f"faults: {len(wide)} entries of {of} are {sum(wide):,} agents to look at, more than {MOST_AFFECTED:,}; "
+            "write which agents each may hit (agents or group), or fewer entries"
         ]  # fmt: skip
     entries: list[FaultEntry] = []
     notes: list[str] = []
@@ -107,6 +117,11 @@ def read_fault_entries(
             if kinds.get(entry.fault.name, entry.fault) != entry.fault:
                 errors.append(f"faults[{number}].kind: {entry.fault.name} is the name of another kind already")
             kinds[entry.fault.name] = entry.fault
+    if (onsets := sum(entry.expected_onsets(duration) for entry in entries)) > MOST_AFFECTED:
+        errors.append(
+            f"faults: about {onsets:,.0f} agents to hit within duration = {duration:g} s are more than "
+            f"{MOST_AFFECTED:,}; lower per_hour, number or duration"
+        )
     return tuple(entries), notes, errors
 
 
@@ -172,14 +187,14 @@ def _kind(
 
 def _read_agents(
     where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group]
-) -> tuple[tuple[int, ...] | None, list[str]]:
+) -> tuple[Sequence[int] | None, list[str]]:
     """Return the agents that an entry may affect, or None, with the errors."""
     if "agents" in table and "group" in table:
         return None, [f"{where} names agents and a group; give one of them"]
     if "agents" in table:
         return read_members(f"{where}.agents", table["agents"], agents)
     if "group" not in table:
-        return tuple(range(agents)), []
+        return range(agents), []
     named = {group.name: group.agents for group in groups}
     if table["group"] in named:
         return named[table["group"]], []
@@ -215,7 +230,6 @@ def _end_errors(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> lis
 # Rates count for the flock and not for each agent: "a motor fails once an hour" is what people know
 # of a fleet.
 ENDLESS = 1e9  # s; how long a fault lasts that does not end
-HOUR = 3600.0  # s
 
 
 class FaultOnset(NamedTuple):

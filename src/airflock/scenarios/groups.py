@@ -5,7 +5,7 @@ with which numbers each agent flies.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import signature
 from pathlib import Path
@@ -39,7 +39,7 @@ class Group:
     """
 
     name: str
-    agents: tuple[int, ...]
+    agents: Sequence[int]
     numbers: Mapping[tuple[str, str], float] = field(default_factory=dict)
     spread: Mapping[tuple[str, str], float] = field(default_factory=dict)
     law: tuple[Model, Any] | None = None
@@ -60,7 +60,7 @@ class FlownLaw(NamedTuple):
 
     model: Model
     parameters: Any
-    agents: tuple[int, ...]
+    agents: Sequence[int]
     varied: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -184,7 +184,7 @@ def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: i
         if group.law is not None and group.agents:
             by_law.setdefault((group.law[0], tuple(choices(group.law[1]).items())), []).append(group)
     apart = {agent for members in by_law.values() for group in members for agent in group.agents}
-    rest = tuple(agent for agent in range(agents) if agent not in apart)
+    rest = _without(agents, apart)
     base = [group for group in groups if group.law is None]
     laws = [FlownLaw(model, parameters, rest, _varied(base, parameters))]
     for (law, _), members in by_law.items():
@@ -197,6 +197,11 @@ def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: i
         who = tuple(sorted(agent for group in members for agent in group.agents))
         laws.append(FlownLaw(law, record, who, _varied(members, record)))
     return tuple(laws)
+
+
+def _without(agents: int, taken: Collection[int]) -> Sequence[int]:
+    """Return the numbers of agents that are not taken; a range where all are left, as a list of them may be large."""
+    return tuple(agent for agent in range(agents) if agent not in taken) if taken else range(agents)
 
 
 def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]:
@@ -214,7 +219,7 @@ def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]
     return tuple(names)
 
 
-def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
+def read_members(where: str, value: Any, agents: int) -> tuple[Sequence[int] | None, list[str]]:
     """Read a list of numbers of agents; return them, or None, with the error, one line."""
     whole = isinstance(value, Sequence) and not isinstance(value, str)
     if not whole or not value or not all(isinstance(k, int) and not isinstance(k, bool) for k in value):
@@ -222,7 +227,8 @@ def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] |
     wrong = [k for k in value if not 0 <= k < agents]
     if wrong:
         return None, [f"{where}: there is no agent {wrong[0]}; this flock has the agents 0 to {agents - 1}"]
-    return tuple(sorted(set(value))), []
+    members = tuple(sorted(set(value)))
+    return (range(agents) if len(members) == agents else members), []
 
 
 def group_names(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
@@ -275,10 +281,10 @@ def read_groups(
     return tuple(groups), notes, errors
 
 
-def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple[int, ...]], list[str]]:
+def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[Sequence[int]], list[str]]:
     """Return the members of each group: a list, so many of the next ones, or all that are left."""
     errors: list[str] = []
-    members: list[tuple[int, ...]] = [()] * len(given)
+    members: list[Sequence[int]] = [()] * len(given)
     taken: set[int] = set()
     # Lists are read first, then counts, then the one group that takes the rest: so the order of
     # groups does not change who is listed.
@@ -291,7 +297,7 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
                 errors.append(f"groups[{number}].agents: agent {twice[0]} is in another group already")
             members[number] = listed or ()
             taken |= set(listed or ())
-    left = [agent for agent in range(agents) if agent not in taken]
+    left = _without(agents, taken)
     rest = []
     for number, table in enumerate(given):
         count = count_of_share(table.get("agents"), agents)
@@ -305,9 +311,9 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
                     f"number of them up to {len(left)}, as many as are left of {agents}"
                 )
                 continue
-            members[number], left = tuple(left[: int(count)]), left[int(count) :]
+            members[number], left = left[: int(count)], left[int(count) :]
     for number in rest[:1]:
-        members[number] = tuple(left)
+        members[number] = left
         if not left:
             errors.append(f"groups[{number}] has no agents, and no agent is left for it")
     errors += [

@@ -176,9 +176,8 @@ def _read_groups_and_faults(
     errors += group_number_errors(flocks, law)
     if law is not None and not errors:
         errors += group_errors(flocks, parts, law, flown.body, flown.sensors)
-    sequential = flight.update == "sequential"
     entries, fault_notes, more = read_fault_entries(
-        document.get("faults", ()), count, flocks, sequential, folder, user_kinds=given.fault_kinds, trust=trust
+        document.get("faults", ()), flight, flocks, folder, user_kinds=given.fault_kinds, trust=trust
     )
     return {"groups": flocks, "faults": entries}, notes + fault_notes, errors + more
 

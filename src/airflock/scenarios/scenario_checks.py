@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from shapely import union_all
-from shapely.geometry import MultiPoint, Point, Polygon, box
+from shapely import get_coordinates, union_all
+from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 from shapely.validation import explain_validity
 
 from airflock.core import Body, Metric, MetricSet, Model, Radio, Sensor, Topology, argument_names, call_rule
@@ -277,21 +277,15 @@ def diameter(points: Sequence[tuple[float, float]]) -> float:
 
 
 def formation_errors(world: arena.Parameters, start_record: start.Parameters, agents: int) -> list[str]:
-    """Return why a formation does not fit into the arena.
-
-    In a convex arena the ends of the straight lines decide; in a polygon every agent is checked.
-    """
+    """Return why a formation does not fit into the arena."""
     plan = ground_plan(world)
     if plan is None:
         return []
     margin = 0.0 if world.edges == "open" else MOST_JITTER * start_record.jitter  # a face would move an agent outside
-    # The last two agents end the two arms of a vee; an echelon ends with the last one.
-    ends = (0, max(agents - 2, 0), agents - 1)
-    for agent in dict.fromkeys(range(agents) if world.arena == "polygon" else ends):
-        x, y, z = FORMATIONS[start_record.kind](
-            agent, start_record.spacing_x, start_record.spacing_y, start_record.spacing_z
-        )
-        low, top = arena.heights_of(world)
+    spacing = (start_record.spacing_x, start_record.spacing_y, start_record.spacing_z)
+    low, top = arena.heights_of(world)
+    for agent in _outermost(plan, FORMATIONS[start_record.kind], spacing, agents):
+        x, y, z = FORMATIONS[start_record.kind](agent, *spacing)
         high = not low + margin <= z <= top - margin and world.dimensions == "3"
         if high or not plan.covers(Point(x, y).buffer(margin) if margin else Point(x, y)):
             spot = f"[{x:g}, {y:g}" + (f", {z:g}]" if world.dimensions == "3" else "]")
@@ -302,6 +296,24 @@ def formation_errors(world: arena.Parameters, start_record: start.Parameters, ag
                 + "; enlarge it, or lower start.spacing_x, start.spacing_y and start.spacing_z"
             ]
     return []
+
+
+def _outermost(plan: Any, place: FormationPlace, spacing: tuple[float, float, float], agents: int) -> list[int]:
+    """Return agents of a formation of which one is outside a ground plan wherever any is.
+
+    Every other agent stands on one line. Its ends are returned, and those beside each place where it crosses an edge:
+    between two such places all are inside, or none.
+    """
+    # Not each agent in turn: ten million that fit took minutes.
+    numbers = set()
+    for first in range(min(agents, 2)):
+        last = (agents - 1 - first) // 2  # number along the line
+        ends = [place(first + 2 * k, *spacing)[:2] for k in (0, last)]
+        crossings = get_coordinates(LineString(ends).intersection(plan.boundary)) if ends[0] != ends[1] else ()
+        along = {0, last} | {int(last * math.dist(ends[0], at) / math.dist(*ends)) for at in crossings}
+        # One more on each side, as a crossing is rounded.
+        numbers |= {first + 2 * k for each in along for k in range(each - 1, each + 3) if 0 <= k <= last}
+    return sorted(numbers)
 
 
 def _edge_errors(world: arena.Parameters) -> list[str]:
