@@ -128,6 +128,9 @@ def test_keys_are_printed_for_people_and_for_machines():
     text = run(app, ["keys", "radio"]).stdout
     assert "radio.delay" in text and "age of neighbours' data on arrival" in text and "[0 … 30 s]" in text
     assert "radio" in run(app, ["keys"]).stdout
+    schema = loads(run(app, ["keys", "--schema"]).stdout)
+    assert schema["properties"]["radio"]["properties"]["delay"]["default"] == 1.0
+    assert run(app, ["keys", "radio", "--schema"]).exit_code != 0  # it is of a whole file
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -3,6 +3,7 @@
 import math
 import random
 import re
+import tomllib
 
 import pytest
 
@@ -13,8 +14,10 @@ from airflock.parts import BODIES, FAULTS as KINDS, SENSORS
 from airflock.scenarios import groups, keys
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.named_code import MODELS, find_law
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.settings import TOP_LEVEL_KEYS
+from airflock.scenarios.units import unit_names
 from airflock.support.errors import ScenarioError
 
 NAME = "vasarhelyi_2018/real_6ms"
@@ -223,3 +226,75 @@ def test_a_polygon_of_very_many_corners_is_refused_before_anything_is_made_of_it
     assert [line.partition(": ")[2] for line in caught.value.errors] == [
         "world.corners and world.obstacles have 10001 corners, more than 10000"
     ]
+
+
+# --- The schema by which editors complete keys ---
+
+
+@pytest.fixture(scope="module")
+def validator():
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = keys.json_schema()
+    jsonschema.Draft7Validator.check_schema(schema)
+    return jsonschema.Draft7Validator(schema)
+
+
+def document_of(name):
+    return tomllib.loads(presets()[name].read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", presets())
+def test_the_schema_takes_every_preset_and_what_may_be_written_in_its_place(validator, name, seed):
+    """Units as text and in tables, digits of choices without quotes, vectors as lists, tolerances of groups."""
+    document, rng = document_of(name), random.Random(seed)
+    for section, key, declared in numbers_of(name):
+        low, high = max(declared.low, -1e3), min(declared.high, 1e3)
+        number = rng.choice([low, high]) if declared.whole else rng.uniform(low, high)
+        unit = rng.choice(sorted(unit_names(declared.unit) or {""}))
+        place = document.setdefault(section, {}) if section else document
+        place[key] = rng.choice([number, f"{number} {unit}" if unit else number, {"value": number, "unit": unit}])
+    document["world"] = {**document.get("world", {}), "dimensions": rng.choice([2, "3"])}
+    document["groups"] = [{"name": "a", "agents": "20 %", "body": {"delay": {"spread": "10 %"}}}, {"model": {}}]
+    document["faults"] = [{"kind": "mine.py", "own": 1}, {"kind": "motor", "at": "1 min", "share": 0.5}]
+    assert not [error.message for error in validator.iter_errors(document)]
+
+
+def numbers_of(name):
+    """Section, key and declaration of each number that a preset's file may hold."""
+    every = [(section, *of) for section, record in load(name).records.items() for of in declarations(record)]
+    return [(section, key, declared) for section, key, declared, _ in every if isinstance(declared, Quantity)]
+
+
+BROKEN = {  # what is wrong → what stands in place of a number
+    "type": lambda rng, of: rng.choice([True, [[1.0]], "much", {"unit": "m"}, {"value": False}]),
+    "range": lambda rng, of: rng.choice([of.high * 2.0 + 1.0, {"value": of.low - abs(of.low) - 1.0}]),
+    "unit": lambda rng, of: rng.choice(["5 furlong", {"value": of.low, "unit": "dBm"}, "0,5 s"]),
+    "interval": lambda rng, of: {"value": of.low, "sauce": "Table 1"},
+}
+
+
+def test_the_schema_finds_in_two_hundred_broken_files_what_one_key_alone_says(validator, seed, tmp_path):
+    """Each is refused by the loader, too; the same file without the change is not."""
+    rng = random.Random(seed)
+    for number in range(200):
+        name = rng.choice([*presets()])
+        document = document_of(name)
+        what = rng.choice([*BROKEN, "key", "section", "choice", "kind", "fault"])
+        section, key, declared = rng.choice(numbers_of(name))
+        place = document.setdefault(section, {}) if section else document
+        if what in BROKEN:
+            place[key] = BROKEN[what](rng, declared)
+        elif what == "key":
+            place[f"{key}x"] = declared.low
+        elif what == "section":
+            document[f"{section or 'top'}s2"] = {}
+        elif what == "choice":
+            document["world"] = {**document.get("world", {}), "edges": rng.choice(["opened", 1, ["open"]])}
+        elif what == "kind":
+            document[rng.choice(["model", "body", "sensors", "radio", "topology"])] = {"kind": "vasarhelyi"}
+        else:
+            wrong = rng.choice([{"kind": "motors"}, {"kind": "motor", "shares": 1}, {"kind": "motor", "share": 7}])
+            document["faults"] = [{"at": 1.0, **wrong}]
+        assert not validator.is_valid(document), (number, name, what, key)
+        with pytest.raises(ScenarioError):
+            build_scenario(document, folder=presets()[name].parent)

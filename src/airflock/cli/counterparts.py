@@ -348,7 +348,11 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         "presets",
         {"name": "airflock.load", "for_speed": "airflock.starting_set", **JSON_OPTIONS},
     ),
-    "keys": PythonCounterpart('airflock.keys("radio")', "keys", {"section": "section", **JSON_OPTIONS}),
+    "keys": PythonCounterpart(
+        'airflock.keys("radio")',
+        "keys",
+        {"section": "section", "schema": "airflock.scenarios.keys.json_schema()", **JSON_OPTIONS},
+    ),
     "validate": PythonCounterpart(
         'airflock.validate("mine.toml")',
         "validate",

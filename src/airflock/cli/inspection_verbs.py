@@ -147,6 +147,9 @@ def keys(
             show_default=False,
         ),
     ] = None,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="A JSON schema of scenario files, by which editors complete keys.")
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """List the sections of a scenario file, or every key of one: meaning, unit, range, default and source.
@@ -155,6 +158,11 @@ def keys(
     """
     from airflock.scenarios import keys as known
 
+    if schema:
+        if section is not None:
+            raise AirflockError(f"--schema is of a whole file; leave {section} out")
+        terminal.print_json(known.json_schema())
+        return
     listed_keys = known.keys(section)
     if as_json:
         terminal.print_json([{**key._asdict(), "options": list(key.options)} for key in listed_keys])

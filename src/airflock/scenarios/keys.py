@@ -1,20 +1,36 @@
-"""Every key that a scenario file may hold, from the declarations of its parameters.
+"""Every key that a scenario file may hold, from the declarations of its parameters, and as a JSON schema for editors.
 
 Keys that no record declares (names, lists and tables that are read as a whole) stand at the end, in
 `UNDECLARED_KEYS`.
 """
 
+import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import cache
 from typing import Any, NamedTuple
 
-from airflock.core import Choice, PacketParameters, Points, Quantity, Text, declarations, format_with_unit, number_names
+from airflock.core import (
+    Choice,
+    Declaration,
+    PacketParameters,
+    Points,
+    Quantity,
+    Text,
+    declarations,
+    format_with_unit,
+    number_names,
+)
 from airflock.parts import BODIES, FAULTS as KINDS, RADIOS, SENSORS
+from airflock.scenarios import formats
 from airflock.scenarios.fault_entries import FaultTiming
+from airflock.scenarios.groups import LETTERS
 from airflock.scenarios.named_code import MODELS, find_law
+from airflock.scenarios.part_kinds import PART_KINDS
+from airflock.scenarios.schema import LONG_FORM
 from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.support import ScenarioError
+from airflock.scenarios.units import unit_names
+from airflock.support import ScenarioError, to_identifier
 
 TOP = "top"  # the keys before the first section
 FAMILIES = {"model": MODELS, "body": BODIES, "sensors": SENSORS, "faults": KINDS}  # sections with records by kind
@@ -233,3 +249,131 @@ UNDECLARED_KEYS: Mapping[str, Mapping[str, UndeclaredKey]] = {
         "sensors": UndeclaredKey("table", "numbers of its agents' sensor; { value, spread } for a tolerance"),
     },
 }
+
+# --- A JSON schema, by which editors complete keys and mark what is wrong ---
+
+DRAFT = "http://json-schema.org/draft-07/schema#"  # read alike by Taplo, by VS Code and by validators
+NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*"  # before a unit, in text
+OWN_FILE = {"type": "string", "pattern": r"\.py$"}
+TYPES = {"text": {"type": "string"}, "list": {"type": ["array", "number", "string"]}, "table": {"type": "object"}}
+
+
+def json_schema() -> dict[str, Any]:
+    """Return a JSON schema of scenario files: what each key alone may hold, by its declaration.
+
+    What takes several keys, another file or code is left to `load`.
+
+    Examples
+    --------
+    >>> from airflock.scenarios import keys
+    >>> keys.json_schema()["properties"]["agents"]["default"]
+    100.0
+    """
+    records = {
+        each.section or "faults": {
+            name: getattr(one, "Parameters", None) or SECTIONS[each.section] for name, one in each.items()
+        }
+        for each in (MODELS, KINDS, *PART_KINDS)
+    }
+    kinds: dict[str, dict[str, list[str]]] = {name: {} for name in records}  # kinds of one record share a table
+    tables: dict[str, dict[str, Any]] = {}
+    for section, of in records.items():
+        for record in dict.fromkeys(of.values()):
+            names = [name for name, one in of.items() if one is record]
+            kinds[section][f"{section}.{names[0]}"] = names
+            tables[f"{section}.{names[0]}"] = _values(section, record)
+    for name in kinds["faults"]:
+        tables[name] |= _values("faults", FaultTiming) | _undeclared("faults")
+    top = _values("", Flight) | _undeclared("") | {"format": {"enum": [formats.FORMAT]}}
+    top |= {name: _closed(_values(name, record)) for name, record in SECTIONS.items() if name not in kinds}
+    top |= {name: _section_by_kind(name, of, tables) for name, of in kinds.items()}
+    of_group = {name: _section_by_kind(name, kinds[name], tables, spread=True) for name in LETTERS}
+    group = _closed(_undeclared("groups") | of_group)
+    top |= {name: {"type": "array", "items": items} for name, items in (("faults", top["faults"]), ("groups", group))}
+    definitions = {name: _closed(values) for name, values in tables.items()}
+    for unit in {key.unit for key in keys() if key.kind == "number"}:
+        units = sorted(unit_names(unit))
+        pattern = rf"{NUMBER}({'|'.join(map(re.escape, units))})\s*$"
+        definitions[f"text.{to_identifier(unit)}"] = {"type": "string", "pattern": pattern if units else "^$"}
+        definitions[f"table.{to_identifier(unit)}"] = _long({"type": "number"}, {"enum": units}, "unit")
+    return {"$schema": DRAFT, "title": "Airflock scenario", **_closed(top), "definitions": definitions}
+
+
+def _closed(properties: Mapping[str, Any], *needed: str) -> dict[str, Any]:
+    return {"type": "object", "properties": properties, "additionalProperties": False, "required": list(needed)}
+
+
+def _undeclared(section: str) -> dict[str, Any]:
+    """Return the schemas of keys of a section that no record declares; kinds and tables of groups are made apart."""
+    known = UNDECLARED_KEYS[section].items()
+    return {name: {"description": key.meaning, **TYPES[key.kind]} for name, key in known if key.kind in TYPES}
+
+
+def _values(section: str, record: type) -> dict[str, Any]:
+    """Return the schema of each key of a record, and of its vectors."""
+    declared = [how for _, how, _ in declarations(record)]
+    values = {_last(key): _value(key, how) for key, how in zip(_declared(section, "", record), declared, strict=True)}
+    for name, size in getattr(record, "VECTORS", {}).items():
+        first = values[f"{name}_0"]
+        many = {"type": "array", "minItems": size, "maxItems": size, "items": {"anyOf": first["anyOf"][:2]}}
+        values[name] = {"description": first["description"], "anyOf": [many, _long(many, {})]}
+    return values
+
+
+def _value(key: Key, declared: Declaration) -> dict[str, Any]:
+    """Return the schema of one value: plain, as text with its unit, or as a table with value, unit and source."""
+    about: dict[str, Any] = {"description": f"{key.meaning} [{key.allowed}]{f' ({key.source})' if key.source else ''}"}
+    about |= {"default": key.default} if key.default not in (None, (), "") else {}
+    plain: dict[str, Any] = {"type": "string"}
+    unit = {"enum": sorted({"", key.unit})}
+    if isinstance(declared, Quantity):
+        plain = {"type": "number", "minimum": key.low, "maximum": key.high}
+        plain |= {"multipleOf": 1} if declared.whole else {}
+        with_unit = [{"$ref": f"#/definitions/{form}.{to_identifier(key.unit)}"} for form in ("text", "table")]
+        return about | {"anyOf": [plain, with_unit[0], _long(plain, unit), with_unit[1]]}
+    if isinstance(declared, Choice):
+        plain = {"enum": [*key.options, *(int(option) for option in key.options if option.isdecimal())]}
+    elif isinstance(declared, Points):
+        plain = {"type": "array", "items": {"type": "number"}, "minItems": declared.axes, "maxItems": declared.axes}
+        for _ in range(declared.depth - 1):
+            plain = {"type": "array", "items": plain}
+        unit = {"enum": sorted({"", key.unit, *unit_names(key.unit)})}
+    return about | {"anyOf": [plain, _long(plain, unit)]}
+
+
+def _long(value: Any, unit: Any, *needed: str) -> dict[str, Any]:
+    """Return the schema of a value in a table with its unit and source."""
+    return _closed({**dict.fromkeys(sorted(LONG_FORM), {}), "value": value, "unit": unit}, "value", *needed)
+
+
+def _section_by_kind(
+    section: str, kinds: Mapping[str, list[str]], tables: Mapping[str, dict[str, Any]], *, spread: bool = False
+) -> dict[str, Any]:
+    """Return the schema of a section whose keys depend on its kind; a kind of one's own may have any.
+
+    kinds  : name of a table → the kinds that have its keys; tables : the keys of each
+    spread : True if numbers may have a spread, as in a group
+    """
+    about: dict[str, Any] = {}
+    may: dict[str, list[Any]] = {}
+    for table in kinds:
+        tables[table]["kind"] = {}  # judged by the section
+        for key, value in tables[table].items():
+            about.setdefault(key, {part: text for part, text in value.items() if part != "anyOf"})
+            may.setdefault(key, []).append({"$ref": f"#/definitions/{table}/properties/{key}"})
+    spreads = [{"type": "object", "required": ["spread"]}] if spread else []
+    every = _closed({key: {"anyOf": [*of, *spreads]} for key, of in may.items()})
+    kind: dict[str, Any] = {"anyOf": [{"enum": sorted(name for names in kinds.values() for name in names)}, OWN_FILE]}
+    meaning = UNDECLARED_KEYS[""].get(f"{section}.kind") or UNDECLARED_KEYS["faults"]["kind"]
+    about["kind"] = {"description": meaning.meaning} | about["kind"] | {"anyOf": [*kind["anyOf"], _long(kind, {})]}
+    # Editors complete from these, and what a key may hold is said by kind: two laws may share the name of a number.
+    schema = {"type": "object", "properties": about}
+    if spread:
+        return schema | {"if": {"properties": {"kind": OWN_FILE}, "required": ["kind"]}, "else": every}
+    # A file that extends another may leave its kind out, and means any of them.
+    conditions: list[Any] = [{"if": {"not": {"required": ["kind"]}}, "then": every}]
+    for table, names in kinds.items():
+        named = {"kind": {"anyOf": [{"enum": names}, _long({"enum": names}, {})]}}
+        then = {"$ref": f"#/definitions/{table}"}
+        conditions.append({"if": {"properties": named, "required": ["kind"]}, "then": then})
+    return schema | {"allOf": conditions}

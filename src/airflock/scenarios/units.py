@@ -59,6 +59,14 @@ def conversion_factor(unit: str, declared: str) -> float | None:
     return 1.0 if name == declared else UNITS.get(declared, {}).get(name)
 
 
+def unit_names(declared: str) -> set[str]:
+    """Return all units that may be written where this one is declared, in each spelling."""
+    units = {declared, *UNITS.get(declared, ())} - {""}
+    spelt = {name.replace("^", mark) for name in units for mark in ("**", "^")}
+    spelt |= {name.replace("^2", "²").replace("^3", "³") for name in units}
+    return spelt | {name for name, unit in SPELLINGS.items() if unit in units}
+
+
 def convert_units(
     document: Mapping[str, Any], records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
