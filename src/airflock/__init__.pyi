@@ -1,12 +1,13 @@
 # What a type checker, an editor and `lazy_loader` read: each public name stands here once.
 from .certificates.certification import certify as certify
-from .check.bodies import check_body as check_body
-from .check.metrics import check_metric as check_metric
-from .check.models import check_model as check_model
-from .check.radios import check_radio as check_radio
-from .check.sensors import check_sensor as check_sensor
-from .check.topologies import check_topology as check_topology
-from .check.types import check_types as check_types
+from .check.models import check_model as check_model, check_types as check_types
+from .check.parts import (
+    check_body as check_body,
+    check_metric as check_metric,
+    check_radio as check_radio,
+    check_sensor as check_sensor,
+    check_topology as check_topology,
+)
 from .cli.papers import paper as paper
 from .core.body import body as body
 from .core.fault import fault as fault

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.truths import flock_solver
+from airflock.check.models import flock_solver
 from airflock.core import radio, random
 from airflock.core.body import first_command
 from airflock.core.contract import State, call_rule

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from airflock.check.truths import FlockSolver, rule_solver
+from airflock.check.models import FlockSolver, rule_solver
 from airflock.core.agent import START, reduce_records, reduce_values
 from airflock.core.contract import State, call_rule
 from airflock.core.maths import TINY, norm

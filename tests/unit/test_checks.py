@@ -7,12 +7,8 @@ from typing import NamedTuple
 import pytest
 
 import airflock
-from airflock.check.bodies import check_body
-from airflock.check.metrics import check_metric
 from airflock.check.models import check_model
-from airflock.check.radios import check_radio
-from airflock.check.sensors import check_sensor
-from airflock.check.topologies import check_topology
+from airflock.check.parts import check_body, check_metric, check_radio, check_sensor, check_topology
 from airflock.check.truths import CheckError, UnitScale, unit_factor
 from airflock.core.body import body
 from airflock.core.metric import metric

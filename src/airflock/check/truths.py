@@ -1,38 +1,27 @@
-"""The truths that checks test: the runner with its report, and the scenes, units and precision that checks need."""
+"""The runner of standing lists: truths with their report, random cases of a part, other units, single precision."""
 
 import copy
 import math
 import re
 from collections import namedtuple
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core import (
-    HeardNeighbour,
-    Model,
-    Percept,
-    Points,
-    Quantity,
-    State,
-    call_rule,
-    choices,
-    component_names,
-    decide,
-    declarations,
-    number_names,
-)
-from airflock.engine import DriverSource, scratch_shapes
-from airflock.scenarios import CallerParts, Scenario, build_scenario, schema, settings_dict
+from airflock.core import Points, Quantity, argument_names, choices, component_names, declarations, law, number_names
+from airflock.engine import DriverSource
+from airflock.scenarios import Scenario, schema, settings_dict
 from airflock.support import AirflockError, RuleError, ScenarioError
 
 # name → what it says, and a check that returns what is wrong, empty if nothing is
 TruthTable = dict[str, tuple[str, Callable[[], str]]]
-Part = TypeVar("Part")
+Array = NDArray[np.float64]
+CLOSE = 1e-9  # more than rounding
+MIRROR: Array = np.diag([1.0, -1.0, 1.0])
 
 
 class CheckError(AirflockError, AssertionError):
@@ -79,14 +68,6 @@ class Report:
         return tuple(truth.name for truth in self.truths if truth.mismatch)
 
 
-def require_part(part_and_errors: tuple[Part | None, list[str]]) -> Part:
-    """Return the part that was read; raise a ScenarioError that lists the errors if there are any."""
-    part, errors = part_and_errors
-    if errors or part is None:
-        raise ScenarioError(errors)
-    return part
-
-
 def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Report:
     """Run all truths and report them; raises CheckError where one breaks that is not declared.
 
@@ -128,6 +109,7 @@ class UnitScale(NamedTuple):
 # Powers of two round nothing, so only guards such as TINY and numbers with hidden units can tell
 # the flights apart.
 UNIT_SCALES = (UnitScale(2.0, 4.0), UnitScale(0.5, 0.25))
+HIDDEN = "a unit is declared wrongly, or a rule contains a number that has a unit"
 DIMENSIONS = {
     "": (0, 0), "1": (0, 0), "dB": (0, 0), "rad": (0, 0), "deg": (0, 0), "kg": (0, 0), "m": (1, 0), "cm": (1, 0),
     "km": (1, 0), "s": (0, 1), "Hz": (0, -1), "N": (1, -2), "Pa": (-1, -2), "J": (2, -2), "W": (2, -3),
@@ -174,8 +156,92 @@ def _points(value: Any, unit: str, units: UnitScale) -> Any:
 
 
 def rescaled_scenario(scenario: Scenario, units: UnitScale) -> Scenario:
-    """A scenario in the other units."""
+    """Return a scenario in the other units."""
     return scenario.with_records({key: rescaled(record, units) for key, record in scenario.records.items()})
+
+
+@dataclass(frozen=True)
+class Trials:
+    """A part with its numbers, tried on random cases: what must hold of each answer.
+
+    rules   : its rules by kind; owner: its name, for errors
+    numbers : record of its parameters
+    answer  : numbers and a case → what the part makes of it, in SI units
+    cases   : random cases; seed : of these
+    scale   : a unit scale and a case → the case in other units, and the factors by which its answer grows
+    floor   : size below which a difference of answers counts as one of this size
+    separate : True if each number of an answer has a size of its own
+    """
+
+    owner: str
+    rules: Mapping[str, Callable[..., Any]]
+    numbers: Any
+    answer: Callable[[Any, Any], Array]
+    cases: Sequence[Any]
+    seed: int
+    scale: Callable[["UnitScale", Any], tuple[Any, Any]]
+    floor: float = 1.0
+    separate: bool = False
+
+    def compiles(self) -> str:
+        """Return why a rule cannot be compiled."""
+        return next((error for rule in self.rules.values() for error in law.rule_errors(rule)), "")
+
+    def same(
+        self,
+        change: Callable[[Any], Any],
+        back: Callable[[Array], Array] = lambda answer: answer,
+        cases: Sequence[Any] | None = None,
+    ) -> str:
+        """Return where the answer to a changed case is not the answer to the case, changed by `back`."""
+        cases = self.cases if cases is None else cases
+        pairs = ((self.answer(self.numbers, change(c)), back(self.answer(self.numbers, c))) for c in cases)
+        return self.first_mismatch(pairs)
+
+    def units(self, close: float = CLOSE) -> str:
+        """Return where the part answers otherwise in other units of length and time."""
+        for units in UNIT_SCALES:
+            other = rescaled(self.numbers, units)
+            scaled = ((case, *self.scale(units, case)) for case in self.cases)
+            pairs = ((self.answer(other, new) / by, self.answer(self.numbers, case)) for case, new, by in scaled)
+            if mismatch := self.first_mismatch(pairs, close):
+                return f"{mismatch}: {HIDDEN}"
+        return ""
+
+    def first_mismatch(self, pairs: Iterable[tuple[Array, Array]], close: float = CLOSE) -> str:
+        """Return the first case in which two answers differ by more than rounding; nan is like nan."""
+        for number, (answer, expected) in enumerate(pairs):
+            sizes = np.abs(np.nan_to_num(expected))
+            size = np.maximum(sizes if self.separate else sizes.max(initial=0.0), self.floor)
+            apart = np.where(np.isnan(answer) & np.isnan(expected), 0.0, np.abs(answer - expected)) / size
+            if not (apart <= close).all():
+                was, off = numbers_text(expected), numbers_text(answer)
+                return f"case {number} of seed {self.seed}: off by {apart.max():.2g}, ({off}) instead of ({was})"
+        return ""
+
+    def single(self, letter: str, arguments: Iterable[Mapping[str, Any]]) -> str:
+        """Return nothing if all rules stay in single precision; raise RuleError where one does not.
+
+        letter : by which rules read the part's numbers; arguments: of rules, by name
+        """
+        for given in arguments:
+            for kind, rule in self.rules.items():
+                constants = {letter: choices(self.numbers)}
+                names = argument_names(rule, kind, self.owner)
+                run_in_single_precision(rule, constants, {**given, letter: self.numbers}, names)
+        return ""
+
+
+def numbers_text(values: Array) -> str:
+    """Return the first numbers of an answer as text."""
+    flat = np.ravel(values)
+    return ", ".join(f"{value:.6g}" for value in flat[:6]) + (", ..." if len(flat) > 6 else "")
+
+
+def rotation_about_vertical(angle: float) -> Array:
+    """Return a turn about the vertical by an angle, rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 # The generated text runs on numbers that refuse integers and uncast literals: `2 * k` is detected
@@ -250,169 +316,3 @@ def to_single_precision(value: Any) -> Any:
         }
         return SimpleNamespace(**choices(value), **numbers, **whole)
     return value
-
-
-FlockSolver = Callable[[Sequence[State]], list[Any]]  # states of all agents → what the rule found for each
-
-
-def flock_solver(scenario: Scenario) -> FlockSolver | None:
-    """The flock rule of a scenario's model, with scratch that lasts for one flight; None if it has none."""
-    model = scenario.model
-    if model.flock is None or model.workspace is None:
-        return None
-    given = {"p": scenario.parameters, "wing": scenario.wing, "aero": scenario.aero}
-    shapes = scratch_shapes(model.workspace, scenario.agents, given)
-    return rule_solver(model.flock, "flock", model.Shared, shapes, given, model.name)
-
-
-def rule_solver(
-    rule: Callable[..., None], kind: str, record: Any, shapes: Any, arguments: dict[str, Any], owner: str
-) -> FlockSolver:
-    """A rule of the whole flock with scratch of these shapes; record : the columns that it fills."""
-    work = type(shapes)(*[[[0.0] * columns for _ in range(rows)] for rows, columns in shapes])
-
-    def solve(flock: Sequence[State]) -> list[Any]:
-        shared = record(*[[0.0] * len(flock) for _ in record._fields])
-        columns = dict(zip(State._fields, (list(column) for column in zip(*flock, strict=True)), strict=True))
-        call_rule(rule, kind, {**arguments, **columns, "n": len(flock), "work": work, "shared": shared}, owner)
-        return [record(*values) for values in zip(*shared, strict=True)]
-
-    return solve
-
-
-# Four agents: the fewest with pairs that do not share an agent.
-AGENT_COUNT = 4  # in a flight
-Rotation = NDArray[np.float64]
-MIRROR: Rotation = np.diag([1.0, -1.0, 1.0])
-
-
-class WallPercept(Percept):
-    """A percept that sees flat walls, as (distance, normal x y z)."""
-
-    surfaces: Sequence[tuple[float, float, float, float]] = ()
-
-    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
-        """Free distance along a unit vector, m."""
-        return self.cast(ux, uy, uz, length, 0.0)
-
-    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance of a sphere along a unit vector, m."""
-        free = length
-        for distance, nx, ny, nz in self.surfaces:
-            towards = -(ux * nx + uy * ny + uz * nz)
-            if towards > 0.0:
-                free = min(free, max(distance - radius, 0.0) / towards)
-        return free
-
-
-class Scene(NamedTuple):
-    """Scene of one agent: positions and velocities (row 0 is its own), walls, its goal and the arena's centre."""
-
-    states: NDArray[np.float64]
-    walls: NDArray[np.float64]
-    goal: NDArray[np.float64]
-    centre: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class TestedLaw:
-    """A law with what its scenes are made of: lengths (m) and speeds (m/s) at which it does something."""
-
-    model: Model
-    scenario: Scenario
-    length: float
-    speed: float
-
-    @property
-    def p(self) -> Any:
-        """Parameters."""
-        return self.scenario.parameters
-
-    def scene(self, rng: np.random.Generator, neighbours: int = 4) -> Scene:
-        """A random scene: neighbours from a hundredth to one and a half of its range, two walls, a goal."""
-        dims = self.scenario.dimensions
-        away = self.length * rng.uniform(0.01, 1.5, (neighbours, 1)) * random_directions(rng, neighbours, dims)
-        speeds = self.speed * rng.uniform(0.2, 1.5, (neighbours + 1, 1)) * random_directions(rng, neighbours + 1, dims)
-        own = self.length * rng.normal(0.0, 1.0, 3) * (1.0, 1.0, float(dims == 3))
-        states = np.hstack([np.vstack([own, own + away]), speeds])
-        walls = np.hstack([self.length * rng.uniform(0.05, 1.0, (2, 1)), random_directions(rng, 2, dims)])
-        return Scene(states, walls, self.length * random_directions(rng, 1, dims)[0], np.zeros(3))
-
-    def command(self, scene: Scene, order: Sequence[int] | None = None) -> NDArray[np.float64]:
-        """Command of agent 0; order: numbers that the agents go by, and the order in which it meets the others."""
-        numbers = list(order) if order is not None else list(range(len(scene.states)))
-        own = State(*scene.states[0].tolist())
-        heard = [HeardNeighbour(numbers[j], State(*scene.states[j].tolist()), 0.0) for j in range(1, len(scene.states))]
-        heard.sort(key=lambda each: each.who)
-        walls = [(d, nx, ny, nz) for d, nx, ny, nz in scene.walls.tolist()]
-        period = self.scenario.sensors.period
-        percept = WallPercept(5.0 * period, *(scene.centre - scene.states[0, :3]).tolist(), *scene.goal.tolist())
-        percept.surfaces = walls
-        made = decide(
-            self.model, self.p, own, heard, walls, time=5.0 * period, period=period, index=numbers[0], percept=percept,
-            shared=self.flock_solution(scene), wing=self.scenario.wing, aero=self.scenario.aero,
-        )  # fmt: skip
-        return np.array(made.command) * (1.0, 1.0, float(self.scenario.dimensions == 3))
-
-    def flock_solution(self, scene: Scene) -> Any:
-        """Return the result of the rule of the whole flock for agent 0."""
-        count = replace(self.scenario.flight, agents=float(len(scene.states)))
-        solve = flock_solver(replace(self.scenario, flight=count))
-        return solve([State(*row) for row in scene.states.tolist()])[0] if solve else None
-
-
-def tested_law(model: Model, parameters: Mapping[str, Any], dimensions: int) -> TestedLaw:
-    """A law in a scene of its own size: a square arena of a few ranges, decisions every fifth step."""
-    p = parameters_with_values(model.Parameters, parameters, "model")
-    known = model.interaction_range or model.reach
-    length = min(float(known(p)), 1e3) if known else 20.0
-    keys = {f"model.{name}": value for name, value in parameters.items()}
-    keys |= {"agents": AGENT_COUNT, "world.dimensions": str(dimensions), "wing.segments": "5", "start.separation": 0.0}
-    keys |= {"world.arena": "none", "start.kind": "ball", "start.radius": length, "radio.range": 10.0 * length}
-    scenario = build_scenario({"model": {}}, f"check of {model.name}", keys, caller_parts=CallerParts(law=model))
-    speed = model.speed(p)
-    speed = speed or min(float(getattr(scenario.body, "speed", getattr(scenario.body, "speed_max", 1.0))), 10.0)
-    period = min(0.2, 0.05 * length / speed)
-    dt = 0.2 * period
-    times = {"dt": dt, "duration": 8.0 * period, "sensors.period": period, "metrics.period": period}
-    side = {"world.arena": "square", "world.side": 4.0 * length, "world.height": 4.0 * length}
-    keys |= times | side | {"radio.delay": period, "metrics.collision_period": dt}
-    return TestedLaw(
-        model,
-        build_scenario({"model": {}}, f"check of {model.name}", keys, caller_parts=CallerParts(law=model)),
-        length,
-        speed,
-    )
-
-
-def random_directions(rng: np.random.Generator, count: int, dims: int) -> NDArray[np.float64]:
-    """Random unit vectors (vector, axis)."""
-    found = rng.normal(size=(count, 3)) * (1.0, 1.0, float(dims == 3))
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
-def rotation_about_vertical(angle: float) -> Rotation:
-    """A turn about the vertical by an angle, rad."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def rotated(scene: Scene, rotation: Rotation) -> Scene:
-    """A scene turned, or seen in a mirror."""
-    states = np.hstack([scene.states[:, :3] @ rotation.T, scene.states[:, 3:] @ rotation.T])
-    walls = np.hstack([scene.walls[:, :1], scene.walls[:, 1:] @ rotation.T])
-    return Scene(states, walls, rotation @ scene.goal, rotation @ scene.centre)
-
-
-def translated(scene: Scene, length: float) -> Scene:
-    """A scene elsewhere, some lengths (m) away."""
-    by = length * np.array([3.7, -1.9, 0.8])
-    states = scene.states + np.hstack([by, np.zeros(3)])
-    return scene._replace(states=states, centre=scene.centre + by)
-
-
-def in_units(scene: Scene, units: UnitScale) -> Scene:
-    """A scene in other units."""
-    states = scene.states * np.repeat([units.metre, units.metre / units.second], 3)
-    walls = scene.walls * (units.metre, 1.0, 1.0, 1.0)
-    return Scene(states, walls, units.metre * scene.goal, units.metre * scene.centre)

@@ -68,6 +68,7 @@ from .named_code import (
 from .part_kinds import (
     PART_KINDS as PART_KINDS,
     CallerParts as CallerParts,
+    part_from_caller as part_from_caller,
 )
 from .scaling import starting_set as starting_set
 from .scenario import (

@@ -288,8 +288,7 @@ def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = 
     own = {
         each.section: getattr(scenario, each.section).rule
         for each in PART_KINDS
-        if f"{each.section}.kind" not in settings
-        and document.get(each.section, {}).get("kind", "") not in ("", *each)
+        if f"{each.section}.kind" not in settings and document.get(each.section, {}).get("kind", "") not in ("", *each)
     }
     kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
     # Files of faults were run when the scenario was loaded; here their kinds are passed by name and
