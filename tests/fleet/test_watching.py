@@ -4,6 +4,7 @@ import os
 import random
 import threading
 import time
+from hashlib import sha256
 
 import numpy as np
 import pytest
@@ -12,7 +13,14 @@ from typer.testing import CliRunner
 import airflock
 from airflock.cli.main import app
 from airflock.core.agent import State
-from airflock.drones.mavlink.messages import CHANNEL_SYSTEM, HEARS_REPORT, parse_report, report_message, text_messages
+from airflock.drones.mavlink.messages import (
+    CHANNEL_SYSTEM,
+    FAULTS_ON_THE_WIRE,
+    NAMED_REPORT,
+    parse_report,
+    report_message,
+    text_messages,
+)
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketSigner, write_key
 from airflock.drones.onboard.card import read_card
@@ -21,10 +29,11 @@ from airflock.drones.onboard.node_program import UdpAddresses, UdpPort
 from airflock.drones.onboard.peers import HEARD_WITHIN
 from airflock.fleets import compare
 from airflock.fleets.drone_faults import INJECTED_KINDS, DroneFaults, InjectedFault
-from airflock.fleets.fleet_observer import SCENARIO_FAULT_NAMES, FleetObserver, TelemetryBroadcast
+from airflock.fleets.fleet_observer import FleetObserver, TelemetryBroadcast, scenario_fault_name
 from airflock.fleets.lockstep import START_TIME, OperatorStation, write_card_and_key
 from airflock.fleets.radio_channel import SOFTWARE_KEY, RadioChannel
 from airflock.fleets.realtime import fly_in_realtime
+from airflock.parts import FAULTS
 from airflock.studio.fleet_page import drone_html, faults_html, fleet_warning, members_html, notes_html
 from airflock.studio.live_page import open_card_and_radios
 from airflock.support.errors import AirflockError, CardError, StudioError
@@ -190,7 +199,7 @@ def test_a_fault_is_told_without_an_amount_that_nobody_knows(kind):
     assert f"<b>{kind}</b>, drone 2: " in faults_html(observer) and "amount" not in faults_html(observer)
 
 
-@pytest.mark.parametrize("kind", SCENARIO_FAULT_NAMES)
+@pytest.mark.parametrize("kind", FAULTS)
 def test_a_fault_of_the_scenario_is_told_by_what_its_kind_does(kind):
     """Three kinds are called as other faults of fleets are: these say that they are of the scenario."""
     f, observer = watched()
@@ -200,7 +209,7 @@ def test_a_fault_of_the_scenario_is_told_by_what_its_kind_does(kind):
         befalls.until(now)
         for datagram in teller.report(now, START_TIME + round((f.now + now) * 1e6), befalls.active_kinds(now)):
             observer.take(datagram, f.now + now)
-    told = SCENARIO_FAULT_NAMES[kind]
+    told = scenario_fault_name(kind)
     assert observer.faults == {"motor": {2}, told: {1, 3}} and told != "motor"
     assert f"<b>{told}</b>, drones 1, 3: " in faults_html(observer) and not faults_html(observer).endswith(": </p>")
 
@@ -208,18 +217,41 @@ def test_a_fault_of_the_scenario_is_told_by_what_its_kind_does(kind):
 def test_what_the_ether_tells_needs_the_key_and_its_own_system():
     f, observer = watched()
     utc = START_TIME + round(f.now * 1e6)
-    told = report_message(HEARS_REPORT, 1, {2, 3})
+    told = report_message("", 1, {2, 3})
     for key, system in ((bytes(32), CHANNEL_SYSTEM), (SOFTWARE_KEY, 2)):
         observer.take(PacketSigner(key, system)(told, utc), f.now)
     assert not observer.links(f.now) and not observer.accepted_count
 
 
 @pytest.mark.parametrize("systems", [set(), {1}, set(range(1, 251))])
-@pytest.mark.parametrize("what", [HEARS_REPORT, len(INJECTED_KINDS)])
+@pytest.mark.parametrize("what", ["", *FAULTS_ON_THE_WIRE, "a kind of one's own, höher"])
 def test_what_is_told_comes_back(what, systems):
     made = report_message(what, 7, systems)
     back = parse_report({"payload": made.payload, "payload_length": made.payload_length})
     assert back == (what, 7, systems)
+
+
+def test_numbers_of_faults_on_the_wire_stay_and_every_shipped_kind_has_one():
+    """What stood at these places flies in other versions: the list only grows."""
+    first = sha256("\n".join(FAULTS_ON_THE_WIRE[:37]).encode()).hexdigest()
+    assert first.startswith("3618fab3919a0694")
+    assert len(FAULTS_ON_THE_WIRE) == len(set(FAULTS_ON_THE_WIRE)) < NAMED_REPORT
+    assert {*INJECTED_KINDS, *map(scenario_fault_name, FAULTS)} <= set(FAULTS_ON_THE_WIRE)
+
+
+def test_kind_of_fault_without_a_number_is_heard_by_its_name():
+    f, observer = watched()
+    teller = TelemetryBroadcast(f.card.members, [])
+    for datagram in teller.report(f.now, START_TIME + round(f.now * 1e6), {"<gale>": {0}}):
+        observer.take(datagram, f.now)
+    assert observer.faults == {"<gale>": {1}} and "<b>&lt;gale&gt;</b>, drone 1: " in faults_html(observer)
+
+
+def test_report_of_a_number_that_is_not_known_is_no_report():
+    made = report_message("stuck", 7, {1})
+    payload = bytes(made.payload)
+    newer = payload[:3] + bytes([len(FAULTS_ON_THE_WIRE) + 1]) + payload[4:]
+    assert parse_report({"payload": newer, "payload_length": made.payload_length}) is None
 
 
 def test_the_field_of_a_card_holds_fence_and_walls_at_their_heights():

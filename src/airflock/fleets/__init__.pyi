@@ -19,9 +19,9 @@ from .drone_faults import (
 )
 from .fleet_observer import (
     DEFAULT_WATCH_ADDRESS as DEFAULT_WATCH_ADDRESS,
-    SCENARIO_FAULT_NAMES as SCENARIO_FAULT_NAMES,
     FleetObserver as FleetObserver,
     is_on_ground as is_on_ground,
+    scenario_fault_name as scenario_fault_name,
 )
 from .flying import (
     VEHICLE_BODIES as VEHICLE_BODIES,

@@ -13,7 +13,6 @@ from airflock.core import forward
 from airflock.drones import (
     CHANNEL_SYSTEM,
     HEARD_WITHIN,
-    HEARS_REPORT,
     STATUS_MESSAGE,
     TEXT_MESSAGE,
     ChannelReport,
@@ -33,20 +32,17 @@ from airflock.drones import (
 )
 from airflock.fleets.drone_faults import INJECTED_KINDS, InjectedFault
 from airflock.fleets.radio_channel import SOFTWARE_KEY
-from airflock.parts import FAULTS as OURS
 from airflock.support import LinkError, printable
 
 DEFAULT_WATCH_ADDRESS: tuple[str, int] = ("127.0.0.1", 14600)  # where who watches hears a fleet in software
 REPORT_PERIOD = 0.5  # s between two reports
 NEIGHBOUR_WITHIN = 1.0  # s; a neighbour whose last packet arrived longer ago is not heard
 NEVER_HEARD = -1e9
-SCENARIO_FAULT_NAMES = {
-    kind: f"{kind} of the scenario" if kind in INJECTED_KINDS else kind for kind in OURS
-}  # text of each kind
-FAULT_NUMBERS = {
-    kind: number
-    for number, kind in enumerate((*INJECTED_KINDS, *SCENARIO_FAULT_NAMES.values()), start=HEARS_REPORT + 1)
-}
+
+
+def scenario_fault_name(kind: str) -> str:
+    """Return what a kind of fault of a scenario is called where faults of a fleet stand beside it."""
+    return f"{kind} of the scenario" if kind in INJECTED_KINDS else kind
 
 
 class TelemetryBroadcast:
@@ -71,14 +67,13 @@ class TelemetryBroadcast:
 
         now           : time of the flight, s
         utc           : µs of Unix time
-        active_faults : kinds of fault of the scenario that hold, each with the indices of the affected drones; a kind
-                        that a user wrote has no number and is not reported
+        active_faults : kinds of fault of the scenario that hold, each with the indices of the affected drones
         """
         if now < self._next_report:
             return []
         self._next_report = now + REPORT_PERIOD
         reports = [
-            report_message(HEARS_REPORT, member, [who for who, at in known.items() if now - at <= NEIGHBOUR_WITHIN])
+            report_message("", member, [who for who, at in known.items() if now - at <= NEIGHBOUR_WITHIN])
             for member, known in self._arrival_times.items()
         ]
         # Faults of one kind are merged: a viewer shows kinds and members, not entries of a file.
@@ -87,16 +82,14 @@ class TelemetryBroadcast:
             if fault.begin <= now < fault.end:
                 holding.setdefault(fault.kind, set()).update(fault.who or self._members)
         for kind, places in (active_faults or {}).items():
-            if kind in SCENARIO_FAULT_NAMES:
-                holding[SCENARIO_FAULT_NAMES[kind]] = {self._members[place] for place in places}
-        reports += [report_message(FAULT_NUMBERS[kind], 0, who) for kind, who in holding.items()]
+            holding[scenario_fault_name(kind)] = {self._members[place] for place in places}
+        reports += [report_message(kind, 0, who) for kind, who in holding.items()]
         return [self._sign(each, utc) for each in reports]
 
 
 LISTENER_ID = 0  # system id of who only listens
 MAX_NOTES = 200  # notes
 REPORT_LIFETIME = 2.0  # s; an older report no longer holds
-KIND_OF_NUMBER = {number: kind for kind, number in FAULT_NUMBERS.items()}
 
 
 class ObserverNote(NamedTuple):
@@ -168,13 +161,12 @@ class FleetObserver:
     def _take_report(self, report: ChannelReport | None, now: float) -> None:
         if report is None:
             return
-        if report.kind == HEARS_REPORT and report.subject in self.peers:
+        if report.fault:
+            if report.fault not in self._faults:
+                self._note(now, 0, f"fault {report.fault}: {self.named(report.systems)}")
+            self._faults[report.fault] = now, report.systems
+        elif report.subject in self.peers:
             self._heard_reports[report.subject] = now, report.systems & self.peers.keys()
-        elif report.kind in KIND_OF_NUMBER:
-            kind = KIND_OF_NUMBER[report.kind]
-            if kind not in self._faults:
-                self._note(now, 0, f"fault {kind}: {self.named(report.systems)}")
-            self._faults[kind] = now, report.systems
 
     def _order(self, values: dict[str, object], now: float) -> None:
         try:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.drones import HEARD_WITHIN, MissionPhase, Peer
-from airflock.fleets import INJECTED_KINDS, SCENARIO_FAULT_NAMES, FleetObserver, is_on_ground
-from airflock.parts import FAULTS as OURS
+from airflock.fleets import INJECTED_KINDS, FleetObserver, is_on_ground, scenario_fault_name
+from airflock.parts import FAULTS
 from airflock.studio import page_measures as measures
 from airflock.studio.browser_view import BrowserView, Trails
 from airflock.studio.flight_pane import ABSENT_HEIGHT, ABSENT_SPACING
@@ -92,9 +92,12 @@ def faults_html(observer: FleetObserver) -> str:
     said = (
         INJECTED_KINDS
         | FAULT_TEXTS
-        | {name: _first_sentence(OURS[kind].doc) for kind, name in SCENARIO_FAULT_NAMES.items()}
+        | {scenario_fault_name(kind): _first_sentence(fault.doc) for kind, fault in FAULTS.items()}
     )
-    lines = [f"<b>{kind}</b>, {observer.named(who)}: {said[kind]}" for kind, who in observer.faults.items()]
+    lines = [
+        f"<b>{html.escape(kind)}</b>, {observer.named(who)}: {said.get(kind, 'a kind that this page does not know')}"
+        for kind, who in observer.faults.items()
+    ]
     return small_print_html("<br>".join(lines)) if lines else ""
 
 

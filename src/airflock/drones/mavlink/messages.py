@@ -18,7 +18,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from airflock.drones.mavlink.frames import common_dialect, message_fields
-from airflock.support import FlightSite, swap_enu_ned
+from airflock.support import FlightSite, printable, swap_enu_ned
 
 STATUS_MESSAGE = 340  # UTM_GLOBAL_POSITION
 STATUS_VERSION = 2  # version 1 had no parts of whole numbers
@@ -166,35 +166,54 @@ CHANNEL_SYSTEM = 254  # system id; below the operator's, above all drones
 REPORT_FORMAT = struct.Struct("<2sBBB32s")
 REPORT_MAGIC, REPORT_VERSION = b"AW", 1
 HEARS_REPORT = 0
+NAMED_REPORT = 255  # a kind of fault without a number: its name stands behind the report
+MOST_NAME = 128 - REPORT_FORMAT.size  # bytes
+# Numbers of kinds of fault on the wire: the place in this list, from 1 on. Fleets and observers of
+# other versions read them, so that it only grows; nothing in it moves or goes.
+FAULTS_ON_THE_WIRE = (
+    "outage", "partition", "loss", "jitter", "duplicate", "corrupt", "rogue", "impostor", "node", "motor", "gnss",
+    "battery", "pilot", "clock", "reboot", "streams", "uplink", "throttle", "no_gnss", "voltage", "capacity",
+    "autopilot_clock", "clock_drift", "battery of the scenario", "clock of the scenario", "fails", "gnss_drift",
+    "gnss_frozen", "gnss_offset", "gnss_spoofed", "motor of the scenario", "pretender", "radio_deaf", "radio_frozen",
+    "radio_range", "radio_silent", "stuck",
+)  # fmt: skip
 
 
 class ChannelReport(NamedTuple):
     """One fact about the radio channel or the faults of a fleet in software.
 
-    kind    : HEARS_REPORT, or 1 and more: number of a kind of fault
+    fault   : name of the kind of fault; empty if the report says whom the subject hears
     subject : system id; 0 for none
     systems : system ids that the subject hears, or that the fault affects
     """
 
-    kind: int
+    fault: str
     subject: int
     systems: frozenset[int]
 
 
-def report_message(kind: int, subject: int, systems: Collection[int]) -> Any:
-    """Return the dialect's message of a report."""
+def report_message(fault: str, subject: int, systems: Collection[int]) -> Any:
+    """Return the dialect's message of a report; a kind of fault without a number is sent by its name."""
+    numbered = fault in FAULTS_ON_THE_WIRE
+    kind = FAULTS_ON_THE_WIRE.index(fault) + 1 if numbered else NAMED_REPORT if fault else HEARS_REPORT
     bits = sum(1 << system for system in set(systems))
     content = REPORT_FORMAT.pack(REPORT_MAGIC, REPORT_VERSION, kind, subject, bits.to_bytes(32, "little"))
+    content += fault.encode()[:MOST_NAME] if kind == NAMED_REPORT else b""
     return common_dialect().MAVLink_tunnel_message(0, 0, 0, len(content), list(content.ljust(128, b"\0")))
 
 
 def parse_report(values: dict[str, Any]) -> ChannelReport | None:
-    """Return the report in the fields of a message; None if it is not one of ours."""
+    """Return the report in the fields of a message; None if it is not one of ours, or of a newer kind of fault."""
     data = bytes(values["payload"])[: values["payload_length"]]
-    if len(data) != REPORT_FORMAT.size:
+    if len(data) < REPORT_FORMAT.size:
         return None
-    magic, version, what, subject, raw = REPORT_FORMAT.unpack(data)
-    if magic != REPORT_MAGIC or version != REPORT_VERSION:
+    magic, version, kind, subject, raw = REPORT_FORMAT.unpack(data[: REPORT_FORMAT.size])
+    name = printable(data[REPORT_FORMAT.size :].decode(errors="replace"))
+    if magic != REPORT_MAGIC or version != REPORT_VERSION or bool(name) != (kind == NAMED_REPORT):
         return None
+    if HEARS_REPORT < kind < NAMED_REPORT:
+        if kind > len(FAULTS_ON_THE_WIRE):
+            return None
+        name = FAULTS_ON_THE_WIRE[kind - 1]
     bits = int.from_bytes(raw, "little")
-    return ChannelReport(what, subject, frozenset(system for system in range(256) if bits >> system & 1))
+    return ChannelReport(name, subject, frozenset(system for system in range(256) if bits >> system & 1))
