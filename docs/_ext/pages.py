@@ -5,7 +5,6 @@ All are written to docs/generated when a build begins; a page is only touched wh
 
 import ast
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from inspect import getsource
 from typing import Any
@@ -15,7 +14,7 @@ import pictures
 from repository import repository
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
-from writing import DOCS, LAWS, key_table, plain, prose, put, table
+from writing import LAWS, key_table, plain, prose, put, table
 
 RULES = ("neighbour", "boundary", "flock", "decide")
 PAPERS = {
@@ -114,23 +113,29 @@ def order_parameters(drawn: bool) -> None:
     """Definition, unit, range, reference and a picture of low and high of every order parameter."""
     from airflock.parts.metrics import metric_sets as registry
 
-    known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
     homes: dict[str, Any] = {}
     absent: dict[str, str] = {}
     units: dict[str, tuple[str, str]] = {}
     sets: dict[str, list[str]] = {}
-    for kind, found in registry.SETS.items():
+    formulas: dict[str, dict[str, tuple[str, ...]]] = {}
+    known = dict(registry.SETS)
+    reported = {name for found in known.values() for name in registry.reported_values(found)}
+    for kind, metric in registry.METRICS.items():  # of no set: measured by metrics = ["NAME"]
+        known |= {} if set(metric.reports) <= reported else {kind: registry.to_metric_set(metric)}
+    for kind, found in known.items():
+        for name, about in registry.formulas(found).items():
+            formulas.setdefault(name, {}).setdefault(kind, about)
         for metric in found.metrics:
             homes |= {name: metric.sample for name in metric.reports if name not in homes}
             absent |= {name: metric.absence(name) for name in metric.reports}
         for name, about in registry.reported_values(found).items():
             units.setdefault(name, about)
             sets.setdefault(name, []).append(kind)
-    for found in registry.SETS.values():
+    for found in known.values():
         homes |= dict.fromkeys(found.reports, found.fitness)
-    wrong = sorted(set(units) ^ set(known))
+    wrong = sorted(set(units) ^ set(formulas))
     if wrong:
-        raise ExtensionError(f"order_parameters.toml and parts/metrics/metric_sets.py differ in {', '.join(wrong)}")
+        raise ExtensionError(f"REPORTS and FORMULAS of order parameters differ in {', '.join(wrong)}")
     import sys
 
     pairs = pictures.pairs()
@@ -139,7 +144,7 @@ def order_parameters(drawn: bool) -> None:
         "`airflock keys metrics` lists their parameters.\n\n",
         table(
             ("metrics.kind", "order parameters"),
-            ((f"`{k}`", _names(registry.reported_values(found))) for k, found in registry.SETS.items()),
+            ((f"`{k}`", _names(registry.reported_values(found))) for k, found in known.items()),
         ),
         "\nHere $N$ is the number of agents, $r_{ij}$ a distance, $h_i$ a heading (unit vector), a bar a mean over the "
         "flock, and $\\langle\\cdot\\rangle_t$ a mean over the samples of a flight. "
@@ -149,24 +154,27 @@ def order_parameters(drawn: bool) -> None:
         "What is computed from other order parameters, such as a fitness, uses these values.\n",
     ]
     for name, (unit, meaning) in units.items():
-        about = known[name]
         meant = plain(meaning)
-        pieces.append(f"\n({name})=\n## {name}\n\n{meant[0].upper()}{meant[1:]}.\n\n$${about['formula']}$$\n\n")
+        pieces.append(f"\n({name})=\n## {name}\n\n{meant[0].upper()}{meant[1:]}.\n\n")
+        # Sets may judge by different formulas of one name, such as their fitness.
+        several = len(set(formulas[name].values())) > 1
+        for kind, (formula, *_) in formulas[name].items():
+            pieces += [f"In the set `{kind}`:\n\n"] if several else []
+            pieces += [f"$${formula}$$\n\n"] if several or kind == sets[name][0] else []
         home = homes.get(name)
         reference = ""
         if home is not None:
             module = sys.modules[home.__module__]
             reference = plain((module.__doc__ or "").strip().split("\n\n")[0].replace("\n", " "))
-        rows = [("unit", unit or "none"), ("range", about["range"]), ("sets", ", ".join(f"`{k}`" for k in sets[name]))]
+        abouts = list(dict.fromkeys(formulas[name].values()))
+        ranges = " or ".join(dict.fromkeys(about[1] for about in abouts))
+        rows = [("unit", unit or "none"), ("range", ranges), ("sets", ", ".join(f"`{k}`" for k in sets[name]))]
         rows += [("where some are absent", absent[name])] if name in absent else []
-        if not reference and "source" not in about:
-            raise ExtensionError(f"order parameter {name}: say where it comes from: source in order_parameters.toml")
-        rows.append(("defined in", f"`{home.__module__}`: {reference}") if reference else ("source", about["source"]))
+        rows += [("defined in", f"`{home.__module__}`: {reference}")] if home is not None else []
         pieces.append(table(("property", "value"), rows))
-        pieces.append(f"\n{about['reads']}\n" if "reads" in about else "")
-        if name not in pairs:
-            raise ExtensionError(f"order parameter {name}: no example of the gallery shows it low and high")
-        pieces.append("\n" + pictures.shown(*pairs[name], f"{name}, low and high", there=drawn))
+        pieces += [f"\n{text}\n" for _, _, *more in abouts for text in more]
+        if name in pairs:
+            pieces.append("\n" + pictures.shown(*pairs[name], f"{name}, low and high", there=drawn))
     put("order_parameters.md", "".join(pieces))
 
 

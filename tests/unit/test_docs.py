@@ -3,7 +3,6 @@
 import ast
 import re
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -82,9 +81,12 @@ def test_every_model_has_its_equations_beside_functions_that_exist():
 
 
 def test_every_order_parameter_has_formula_and_range():
-    known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
-    assert set(known) == {name for found in registry.SETS.values() for name in registry.reported_values(found)}
-    assert all(entry["formula"] and entry["range"] for entry in known.values())
+    for metric in registry.METRICS.values():
+        assert set(metric.formulas) == set(metric.reports), metric.name
+    for kind, found in registry.SETS.items():
+        known = registry.formulas(found)
+        assert set(known) == set(registry.reported_values(found)), kind
+        assert all(len(about) in (2, 3) and all(about) for about in known.values()), kind
 
 
 def test_every_order_parameter_is_shown_by_two_flocks_that_differ_in_it(monkeypatch, scored_plainly):

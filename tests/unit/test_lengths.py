@@ -9,7 +9,6 @@ from airflock.parts import SETS
 from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.recordings.scores import (
     IN_BODIES,
-    NEEDS,
     body_length_settings,
     measure_recording,
     nearness_note,
@@ -77,8 +76,10 @@ def test_line_on_what_is_near_has_the_radius_of_each_order_parameter_that_depend
     recording, settings = tracks(seed), body_length_settings(length) | {"metrics.r_comm": 7.0}
     values = measure_recording(recording, settings)[0]
     note = nearness_note(recording, scenario_of_recording(recording, settings), values)
+    needs = scenario_of_recording(recording, settings).metrics.rule.needs
+    assert needs
     for name in values:
-        for key in set(NEEDS.get(name, ())) & IN_BODIES.keys():
+        for key in set(needs.get(name, ())) & IN_BODIES.keys():
             part = note.split(f"metrics.{key} = {settings[f'metrics.{key}']:g} m (")[1].split(")")[0]
             assert name in part.split(", ")
     assert "metrics.r_cluster" in note and "metrics.r_comm = 7 m" in note

@@ -141,3 +141,8 @@ def test_package_without_parts_costs_no_import_of_metadata():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert isinstance(contract.installed(), tuple)
+
+
+@pytest.mark.parametrize("kind", KINDS, **ids)
+def test_no_file_of_the_package_is_left_out(kind):
+    assert [line for line in kind.errors.values() if "has none of" not in line] == []

@@ -146,8 +146,21 @@ def test_a_file_and_the_same_names_given_directly_are_one(files):
     )
     a, b = (found.judged(fly_world(found, 2, record=True, device="python").values) for found in (from_file, direct))
     assert a == b
-    listed = load("vasarhelyi_2018/4ms", SMALL, metrics=["speed", airflock.metric(namespace(METRIC), "spread")])
-    assert listed.numbers["q"] == load("vasarhelyi_2018/4ms").numbers["q"]
+
+
+def test_numbers_of_a_metric_are_keys_of_every_list_that_names_it():
+    spread = airflock.metric(namespace(METRIC), "spread")
+    listed = load("vasarhelyi_2018/4ms", {**SMALL, "metrics.width": 2.0}, metrics=["speed", spread])
+    assert set(listed.numbers["q"]) == {"width", *load("vasarhelyi_2018/4ms").numbers["q"]}
+    assert listed.metrics.width == 2.0
+
+
+def test_two_metrics_that_declare_one_number_otherwise_are_refused():
+    one, other = (METRIC.replace("airflock.quantity(10.0", f"airflock.quantity({width}") for width in (10.0, 20.0))
+    other = other.replace("spread", "stretch")
+    metrics = [airflock.metric(namespace(text), name) for text, name in ((one, "spread"), (other, "stretch"))]
+    with pytest.raises(RuleError, match="two of its metrics declare metrics.width otherwise"):
+        load("vasarhelyi_2018/4ms", SMALL, metrics=metrics)
 
 
 def test_a_recording_is_scored_without_the_code_that_it_was_flown_with(files):

@@ -105,6 +105,9 @@ class Metric:
     survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that `agent` may read;
               `workspace` of any of n, q, wing gives its scratch
     reports : of every order parameter that comes out: its unit and what it means
+    formulas : of the same: formula (LaTeX), range, and how to read it where that needs a sentence (FORMULAS)
+    needs   : of those that depend on them: numbers of the metric, such as lengths, that tracks alone do not say (NEEDS)
+    Parameters : record of numbers of its own, which its rules read from q beside those that every set has
     courses : the same of each field of Sample that is no order parameter by itself (COURSES)
     total   : from the combined values of a whole flight to named order parameters; by default they are these
     violates : truths of `airflock.check_metric` that do not hold for it, and why (VIOLATES)
@@ -138,6 +141,9 @@ class Metric:
     reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     violates: Mapping[str, str] = field(default_factory=dict)
     courses: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    formulas: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    Parameters: type | None = None
 
     def __hash__(self) -> int:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
@@ -214,7 +220,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
         raise RuleError(f"metric {name}: CLOCK = {clock!r}; give one of {CLOCKS}")
     records = (
         "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
-        "Memory", "within", "settled", "linked_within", "total", "survey", "Shared", "workspace",
+        "Memory", "within", "settled", "linked_within", "total", "survey", "Shared", "workspace", "Parameters",
     )  # fmt: skip
     return Metric(
         name=name,
@@ -223,6 +229,8 @@ def metric(namespace: Any, name: str = "") -> Metric:
         reports=dict(found.get("REPORTS", {})),
         violates=dict(found.get("VIOLATES", {})),
         courses=dict(found.get("COURSES", {})),
+        formulas=dict(found.get("FORMULAS", {})),
+        needs=dict(found.get("NEEDS", {})),
         clock=clock,
         **{key: found[key] for key in records if key in found},
     )
@@ -237,6 +245,7 @@ class MetricSet:
     chosen     : `chosen(q)` → the metrics, where a parameter decides; else `metrics`
     fitness    : of any of values, agents, duration (s), q → named numbers, from the order parameters of one flight
     reports    : of what `fitness` gives: unit and meaning
+    formulas, needs : as those of a metric, of all that it reports
     best       : the order parameter that is larger in a better flight; empty if none is
     violates   : truths of `airflock.check_metric` that its fitness breaks, and why (VIOLATES)
     errors     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one line each
@@ -251,6 +260,8 @@ class MetricSet:
     best: str = ""
     errors: Callable[..., list[str]] | None = None
     violates: Mapping[str, str] = field(default_factory=dict)
+    formulas: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.metrics, self.fitness))

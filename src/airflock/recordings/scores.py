@@ -157,7 +157,7 @@ def undefined_metrics_of(
         return {}
     sampled = (name for metric in scenario.metrics.rule.metrics for name in metric.Sample._fields)
     names = (*reported_values(scenario.metrics.rule), *sampled)
-    return undefined_metrics(names, scenario.metrics.rule.name, settings or {}, arena=scenario.world.arena != "none")
+    return undefined_metrics(names, scenario.metrics.rule.needs, settings or {}, arena=scenario.world.arena != "none")
 
 
 PRESENCE_METRICS = {"present_measured": ("", "share that is present, without gaps that the import bridged")}
@@ -343,26 +343,6 @@ def _between(
 # scored with lengths of drones: all in collision at 3 m. A recording without a scenario gets no
 # order parameter whose length, centre or wanted speed nobody gave. Excursions and rotations are
 # left out, too: the origin may be a corner of a picture.
-FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
-# Order parameter: keys of `metrics` that it depends on.
-NEEDS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("phi_coll", "n_coll", "f_coll"), ("r_coll",)),
-    **dict.fromkeys(("phi_corr", "f_corr", "n_min", "f_cluster", "n_clusters", "n_stragglers"), ("r_cluster",)),
-    **dict.fromkeys(("n_groups", "share_alone", "share_largest", "local_density"), ("r_cluster",)),
-    **dict.fromkeys(("extension_groups_cm", "polarization_groups_deg"), ("r_cluster",)),
-    **dict.fromkeys(("n_disc", "f_disc"), ("r_comm",)),
-    **dict.fromkeys(("f_collision", "cns_pol"), ("r_b",)),
-    **dict.fromkeys(("cns_ext", "quality"), ("max_e", "r_b")),
-    **dict.fromkeys(("cns_ext_groups", "quality_groups"), ("max_e", "r_b", "r_cluster")),
-    "cns_pol_groups": ("r_b", "r_cluster"),
-    **dict.fromkeys(("flocked", "time_to_flock"), ("r_flock",)),
-    **dict.fromkeys(("n_contacts", "touching", "n_env_coll", "f_env"), ("r_body",)),
-    "crowding": ("r_safe",),
-    "f_speed": ("v_flock",),
-    "f_wall": ("r_tol",),
-    **dict.fromkeys(("phi_lap", "phi_lap_abs"), ("centre_x", "centre_y")),
-}
-FITNESSES = {"vasarhelyi": FITNESS, "kidger": ("r_coll", "r_flock"), "dimock": ("r_coll",)}
 IN_BODIES = {"r_coll": 0.5, "r_body": 0.5, "r_b": 0.5, "r_safe": 1.0, "r_cluster": 5.0, "r_comm": 5.0}
 
 
@@ -396,13 +376,13 @@ def body_length_settings(length: float) -> dict[str, float]:
 
 
 def undefined_metrics(
-    names: Iterable[str], kind: str, settings: Mapping[str, Any], *, arena: bool
+    names: Iterable[str], needs: Mapping[str, tuple[str, ...]], settings: Mapping[str, Any], *, arena: bool
 ) -> dict[str, tuple[str, ...]]:
     """Return the order parameters of a set that depend on keys which the settings lack, and these keys.
 
+    needs : of the set
     arena : whether settings give one, without which nobody is ever outside
     """
-    needs = {**NEEDS, "fitness": FITNESSES.get(kind, ())}
     missing = {name: tuple(key for key in needs.get(name, ()) if f"metrics.{key}" not in settings) for name in names}
     outside = {"phi_wall": ("world.arena",)} if "phi_wall" in missing and not arena else {}
     return {name: keys for name, keys in missing.items() if keys} | outside
@@ -422,7 +402,7 @@ def nearness_note(recording: xr.Dataset, scenario: Scenario, names: Iterable[str
     """Return one line with the radii that decide what is near in these order parameters; empty for a flight."""
     users: dict[str, list[str]] = {}
     for name in names if scenario_document(recording) is None else ():
-        for key in NEEDS.get(name, ()):
+        for key in scenario.metrics.rule.needs.get(name, ()):
             users.setdefault(key, []).append(name)
     q = scenario.resolved_metrics()
     radii = [

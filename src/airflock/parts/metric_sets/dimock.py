@@ -16,6 +16,14 @@ CLOSE = 10.0  # lone powers per unit of crowding: half of r_safe costs 2.5
 UNSTABLE = 0.25  # lone powers for a formation that has not settled
 VIOLATES = {"units": "a collision costs COLLIDED, a number of watts"}
 REPORTS = {"fitness": ("W", "minus the mean power per bird, less penalties (metrics.fitness)")}
+FORMULAS = {
+    "fitness": (
+        r"-\left\langle \frac{1}{N}\sum_i P_i \right\rangle_t",
+        "below 0",
+        "Minus the mean power, W, and after a collision a fixed low value; metrics.fitness may add penalties.",
+    ),
+}
+NEEDS = {"fitness": ("r_coll",)}
 
 
 def fitness(values: Mapping[str, float], q: Parameters) -> dict[str, float]:

@@ -23,6 +23,21 @@ REPORTS = {
     "f_env": ("", "partial fitness of collisions with the environment"),
     "fitness": ("", "flocked · f_goals · f_coll · f_env"),
 }
+FORMULAS = {
+    "f_goals": (r"\frac{1}{G}\sum_g \max\left(1 - \frac{t_g}{T}, 0\right)", "0 to 1"),
+    "f_coll": (
+        r"F_3(C, 3) = \left(\frac{3}{C + 3}\right)^2",
+        "0 to 1",
+        "$C$ are collisions per agent and minute, and seconds that pairs spend in contact.",
+    ),
+    "f_env": (r"F_3 \textrm{ of the collisions with the environment per agent and minute}", "0 to 1"),
+    "fitness": (
+        r"F = \textrm{flocked}\, F^{goals} F^{coll} F^{env}",
+        "0 to 1",
+        "A product: one partial fitness of 0 makes it 0, so look at the parts first.",
+    ),
+}
+NEEDS = {"f_coll": ("r_coll",), "f_env": ("r_body",), "fitness": ("r_coll", "r_flock")}
 
 
 def fitness(values: Mapping[str, Any], agents: int, duration: float) -> dict[str, float]:

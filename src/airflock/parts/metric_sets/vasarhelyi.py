@@ -18,6 +18,35 @@ REPORTS = {
     "f_corr": ("", "partial fitness: correlation"),
     "fitness": ("", "product of the partial fitnesses"),
 }
+FORMULAS = {
+    "f_speed": (
+        r"F_1(\phi^{vel}, v_{flock}, v_{tol})",
+        "0 to 1",
+        "0 below $v_{flock} - v_{tol}$, 1 from $v_{flock}$ upwards.",
+    ),
+    "f_coll": (
+        r"F_3(\phi^{coll}, a_{tol}) = \left(\frac{a_{tol}}{\phi^{coll} + a_{tol}}\right)^2",
+        "0 to 1",
+    ),
+    "f_disc": ("F_3(N_{disc}, N/5)", "0 to 1"),
+    "f_cluster": ("F_1(N_{min}, N/5, N/5)", "0 to 1"),
+    "f_wall": (r"e^{-(\phi^{wall}/r_{tol})^2}", "0 to 1"),
+    "f_corr": (r"\max(\phi^{corr}, 0)", "0 to 1"),
+    "fitness": (
+        "F = F^{speed} F^{coll} F^{disc} F^{cluster} F^{wall} F^{corr}",
+        "0 to 1",
+        "A product: one partial fitness of 0 makes it 0, so look at the parts first.",
+    ),
+}
+NEEDS = {
+    "f_speed": ("v_flock",),
+    "f_coll": ("r_coll",),
+    "f_disc": ("r_comm",),
+    "f_cluster": ("r_cluster",),
+    "f_wall": ("r_tol",),
+    "f_corr": ("r_cluster",),
+    "fitness": ("r_cluster", "r_coll", "r_comm", "v_flock"),
+}
 
 
 def fitness(values: Mapping[str, float], agents: int, q: Parameters) -> dict[str, float]:

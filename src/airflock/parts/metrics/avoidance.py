@@ -10,6 +10,11 @@ REPORTS = {
     "n_avoid": ("", "number of avoidances begun, per agent"),
     "rays": ("", "rays cast per agent and decision"),
 }
+FORMULAS = {
+    "avoiding": (r"\left\langle \frac{1}{N} |\{i : \textrm{the way ahead is not free}\}| \right\rangle_t", "0 to 1"),
+    "n_avoid": (r"\frac{1}{N} \cdot \textrm{number of avoidances that begin}", "0 and more"),
+    "rays": (r"\left\langle \frac{1}{N}\sum_i \textrm{rays}_i \right\rangle_t", "1 to model.rays"),
+}
 
 OVER_TIME = {"n_avoid": "sum"}
 

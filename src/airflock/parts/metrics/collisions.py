@@ -8,6 +8,21 @@ counts once, and again only after a separation.
 from typing import NamedTuple
 
 REPORTS = {"phi_coll": ("", "share of pairs in contact (collision risk)"), "n_coll": ("", "number of collisions")}
+FORMULAS = {
+    "phi_coll": (
+        r"\left\langle \frac{1}{N(N-1)}\sum_{i \ne j} \Theta(r_{coll} - r_{ij}) \right\rangle_t",
+        "0 to 1",
+        "Share of pairs in contact: the risk, while n_coll counts events.",
+    ),
+    "n_coll": (
+        r"\textrm{number of contacts that begin}",
+        "0 and more",
+        "A contact begins when an agent with nobody within $r_{coll}$ comes that close to one of a lower index. A "
+        "lasting contact counts once, and again only after a separation; an agent that joins a group in contact "
+        "counts once. 0 in n flights does not mean never: see the bound under the table.",
+    ),
+}
+NEEDS = {"phi_coll": ("r_coll",), "n_coll": ("r_coll",)}
 
 CLOCK = "collision"
 VIOLATES = {"renumbering": "of two that meet, the one with the higher index begins the event, if nobody was near it"}

@@ -11,6 +11,20 @@ REPORTS = {
     "n_contacts": ("", "contacts with walls, obstacles and the scene"),
     "touching": ("", "share of agents and instants in contact"),
 }
+FORMULAS = {
+    "n_contacts": (
+        r"\textrm{number of contacts with walls, obstacles and the scene that begin}",
+        "0 and more",
+        "Agents are spheres of radius metrics.r_body. A lasting contact counts once, and again only after a "
+        "separation.",
+    ),
+    "touching": (
+        r"\left\langle \frac{1}{N}\sum_i \Theta(e_i + r_{body}) \right\rangle_t",
+        "0 to 1",
+        "Share of agents and instants in contact ($e_i$ is the excursion, m).",
+    ),
+}
+NEEDS = {"n_contacts": ("r_body",), "touching": ("r_body",)}
 
 CLOCK = "collision"
 OVER_TIME = {"n_contacts": "sum"}

@@ -6,6 +6,20 @@ Self pairs are excluded, as in the authors' program; a lone agent and an agent a
 from typing import NamedTuple
 
 REPORTS = {"phi_corr": ("", "velocity correlation within clusters"), "n_min": ("", "size of the smallest cluster")}
+FORMULAS = {
+    "phi_corr": (
+        r"\left\langle \frac{1}{N}\sum_i \frac{1}{N_i - 1}\sum_{j \in J_i} h_i \cdot h_j \right\rangle_t",
+        "-1 to 1",
+        "$J_i$ are the other agents of the cluster of $i$, which has $N_i$ members. 1: all members of each cluster "
+        "fly alike.",
+    ),
+    "n_min": (
+        r"\left\langle \min_c N_c \right\rangle_t",
+        "1 to N",
+        "Members of the smallest cluster, averaged over time, so not a whole number.",
+    ),
+}
+NEEDS = {"phi_corr": ("r_cluster",), "n_min": ("r_cluster",)}
 
 REDUCE = {"smallest": "min"}
 

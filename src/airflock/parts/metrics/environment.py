@@ -7,6 +7,10 @@ separation.
 from typing import NamedTuple
 
 REPORTS = {"n_env_coll": ("", "collisions with the environment")}
+FORMULAS = {
+    "n_env_coll": (r"\textrm{number of contacts with the scene that begin}", "0 and more"),
+}
+NEEDS = {"n_env_coll": ("r_body",)}
 
 CLOCK = "collision"
 OVER_TIME = {"n_env_coll": "sum"}

@@ -13,6 +13,19 @@ REPORTS = {
     "phi_wall": ("m", "mean excursion of agents that are outside"),
     "clearance": ("m", "smallest distance to walls and obstacles; below 0: outside"),
 }
+FORMULAS = {
+    "phi_wall": (
+        r"\frac{\sum_t \sum_i \max(e_i, 0)}{\sum_t \sum_i \Theta(e_i)}",
+        "0 and more",
+        "How far outside the agents outside are ($e_i$, m). It does not say how many are outside.",
+    ),
+    "clearance": (
+        r"\min_t \min_i (-e_i)",
+        "any; below 0 if an agent was outside",
+        "How near the nearest agent came to a wall or an obstacle ($e_i$ is the excursion, m), at a sample. It "
+        "distinguishes flights in which phi_wall is 0, so a search can keep a limit such as `clearance<0 at 0.01/h`.",
+    ),
+}
 COURSES = {"out": ("m", "sum of the distances of those outside"), "outside": ("", "number of agents outside")}
 
 REDUCE = {"clearance": "min"}

@@ -12,6 +12,11 @@ REPORTS = {
     "flocked": ("", "share of agents within metrics.r_flock of the flock's centre"),
     "time_to_flock": ("s", "time until all agents are flocked for the first time"),
 }
+FORMULAS = {
+    "flocked": (r"\left\langle \frac{1}{N} |\{i : |x_i - \bar x| \le r_{flock}\}| \right\rangle_t", "0 to 1"),
+    "time_to_flock": (r"\min\{t : \textrm{all are flocked}\}", "0 to the duration; nan if never"),
+}
+NEEDS = {"flocked": ("r_flock",), "time_to_flock": ("r_flock",)}
 
 OVER_TIME = {"time_to_flock": "min"}
 

@@ -25,6 +25,40 @@ REPORTS = {
     "quality_groups": ("", "quality of groups"),
     "local_density": ("1/m² or 1/m³", "density of agents around an agent"),
 }
+FORMULAS = {
+    "n_groups": (r"\left\langle |\{c : N_c \ge 2\}| \right\rangle_t", "0 to N/2"),
+    "share_alone": (r"\left\langle \frac{1}{N} |\{i : N_i = 1\}| \right\rangle_t", "0 to 1"),
+    "share_largest": (r"\left\langle \frac{1}{N}\max_c N_c \right\rangle_t", "1/N to 1"),
+    "extension_groups_cm": (r"\left\langle \frac{1}{N_g}\sum_i |x_i - \bar x_{c(i)}| \right\rangle_t", "0 and more"),
+    "polarization_groups_deg": (
+        r"\left\langle \frac{1}{N_g}\sum_i \arccos(h_i \cdot \hat{\bar h}_{c(i)}) \right\rangle_t",
+        "0 to 180",
+    ),
+    "cns_ext_groups": (
+        r"1 - \frac{1}{N\,e_{max}}\left(\sum_{free} |x_i - \bar x_{c(i)}| + k\,(N_{coll} + N_{alone})\right)",
+        "up to 1; 1 is best",
+    ),
+    "cns_pol_groups": (
+        r"1 - \frac{1}{N\,\pi}\left(\sum_{free} \theta_{i,c(i)} + \rho\,(N_{coll} + N_{alone})\right)",
+        "0 to 1; 1 is best",
+    ),
+    "quality_groups": (r"\sigma\,\textrm{cns}_{ext,groups} + \gamma\,\textrm{cns}_{pol,groups}", "up to 1; 1 is best"),
+    "local_density": (
+        r"\left\langle \frac{1}{N}\sum_i \frac{|\{j : r_{ij} < r_{cluster}\}|}{V(r_{cluster})} \right\rangle_t",
+        "0 and more",
+    ),
+}
+NEEDS = {
+    "n_groups": ("r_cluster",),
+    "share_alone": ("r_cluster",),
+    "share_largest": ("r_cluster",),
+    "extension_groups_cm": ("r_cluster",),
+    "polarization_groups_deg": ("r_cluster",),
+    "cns_ext_groups": ("max_e", "r_b", "r_cluster"),
+    "cns_pol_groups": ("r_b", "r_cluster"),
+    "quality_groups": ("max_e", "r_b", "r_cluster"),
+    "local_density": ("r_cluster",),
+}
 COURSES = {
     "extension_groups": ("m", "extension within groups"),
     "polarization_groups": ("rad", "polarization within groups"),

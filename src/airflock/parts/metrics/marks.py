@@ -8,10 +8,23 @@ figures were counted so. Everything else is as in `quality`.
 
 from typing import NamedTuple
 
-from airflock.parts.metrics.quality import COURSES, REPORTS, Agent, Sample, angle_from, offset_from, sample, total
+from airflock.parts.metrics.quality import (
+    COURSES,
+    FORMULAS,
+    NEEDS,
+    REPORTS,
+    Agent,
+    Sample,
+    angle_from,
+    offset_from,
+    sample,
+    total,
+)
 
 __all__ = [
     "COURSES",
+    "FORMULAS",
+    "NEEDS",
     "REPORTS",
     "VIOLATES",
     "Agent",

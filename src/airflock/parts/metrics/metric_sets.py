@@ -5,7 +5,7 @@ from dataclasses import is_dataclass, make_dataclass
 from types import ModuleType
 from typing import Any
 
-from airflock.core import Kind, Metric, MetricSet, Parameters as Record, metric, namespace_names
+from airflock.core import Kind, Metric, MetricSet, Parameters as Record, declarations, metric, namespace_names
 from airflock.parts.metrics import parameters
 from airflock.support import RuleError
 
@@ -71,10 +71,19 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
     if fitness and "fitness" not in reports:
         reports["fitness"] = ("", (fitness.__doc__ or "fitness").partition("\n")[0])
     best = str(found.get("BEST") or ("fitness" if "fitness" in reports else ""))
-    record = _parameters(found.get("Parameters"), name)
-    violates = dict(found.get("VIOLATES", {}))
-    errors = found.get("errors", found.get("faults"))  # as it was called before
-    return MetricSet(name, tuple(metrics), record, found.get("chosen"), fitness, reports, best, errors, violates)
+    return MetricSet(
+        name,
+        tuple(metrics),
+        _parameters([found.get("Parameters"), *(each.Parameters for each in metrics)], name),
+        found.get("chosen"),
+        fitness,
+        reports,
+        best,
+        found.get("errors", found.get("faults")),  # as it was called before
+        dict(found.get("VIOLATES", {})),
+        _joined(metrics, "formulas") | found.get("FORMULAS", {}),
+        _joined(metrics, "needs") | found.get("NEEDS", {}),
+    )
 
 
 def to_metric_set(source: Any) -> MetricSet:
@@ -82,7 +91,7 @@ def to_metric_set(source: Any) -> MetricSet:
     if isinstance(source, MetricSet):
         return source
     if isinstance(source, Metric):
-        return MetricSet(source.name, (source,), parameters.Parameters)
+        return metric_set({"METRICS": [source]}, source.name)
     if isinstance(source, str) and source in SETS:
         return SETS[source]
     if isinstance(source, Sequence) and not isinstance(source, str):
@@ -104,15 +113,29 @@ def _metric(item: Any, owner: str) -> Metric:
     raise RuleError(f"metric set {owner}: {item!r} is not a metric; known: {', '.join(METRICS)}")
 
 
-def _parameters(record: Any, owner: str) -> type:
-    """Record of a set's own parameters with those that every set has."""
-    if record is None:
-        return parameters.Parameters
-    if not (isinstance(record, type) and issubclass(record, Record) and is_dataclass(record)):
-        raise RuleError(f"metric set {owner}: Parameters is not a frozen dataclass derived from airflock.Parameters")
-    if issubclass(record, parameters.Parameters):
-        return record
-    return make_dataclass("Parameters", [], bases=(parameters.Parameters, record), frozen=True, kw_only=True)
+def _parameters(records: Sequence[Any], owner: str) -> type:
+    """Return the record of the numbers that every set has, with those of a set and of its metrics."""
+    own: list[type] = []
+    for record in dict.fromkeys(record for record in records if record is not None):
+        if not (isinstance(record, type) and issubclass(record, Record) and is_dataclass(record)):
+            raise RuleError(
+                f"metric set {owner}: Parameters is not a frozen dataclass derived from airflock.Parameters"
+            )
+        own.append(record)
+    declared: dict[str, Any] = {}
+    for record in (parameters.Parameters, *own):
+        for name, declaration, default in declarations(record):
+            if declared.setdefault(name, (declaration, default)) != (declaration, default):
+                raise RuleError(f"metric set {owner}: two of its metrics declare metrics.{name} otherwise")
+    if len(own) == 1 and issubclass(own[0], parameters.Parameters):
+        return own[0]
+    bases = (parameters.Parameters, *own)
+    return make_dataclass("Parameters", [], bases=bases, frozen=True, kw_only=True) if own else bases[0]
+
+
+def _joined(metrics: Sequence[Metric], field: str) -> dict[str, Any]:
+    """Return what several metrics say of their order parameters."""
+    return {name: about for each in metrics for name, about in getattr(each, field).items()}
 
 
 def scalar_names(metric_set_: MetricSet, q: Any, goals: bool = False) -> tuple[str, ...]:
@@ -129,6 +152,20 @@ SETS = Kind(
     "airflock.parts.metric_sets", "set of order parameters", metric_set, MetricSet, ("METRICS",), "metrics",
     "vasarhelyi", shared=None, take=to_metric_set, check="check_metric",
 )  # fmt: skip
+FORMULAS = {  # as those of a metric, of what the engine keeps
+    "goals_reached": (
+        r"\textrm{goals that the centre of the flock came to}",
+        "0 to goals",
+        "Kidger's drones follow goals.",
+    ),
+    "goals": (r"\textrm{goals given}", "1 and more", "Kidger; section `[goals]` of the scenario."),
+    "time_to_goal": (r"t_1, t_2, \ldots", "0 to the duration; nan if never", "Kidger."),
+    "present": (
+        r"\left\langle \frac{N(t)}{N} \right\rangle_t",
+        "0 to 1",
+        "Ours. Only reported where agents come and go; $N(t)$ are those that are there.",
+    ),
+}
 PRESENCE = {"present": ("", "share of all individuals and instants for which the recording has data")}
 
 
@@ -136,3 +173,8 @@ def reported_values(metric_set_: MetricSet) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every order parameter that flights scored by a set report."""
     own = {name: about for each in metric_set_.metrics for name, about in each.reports.items()}
     return own | dict(metric_set_.reports) | GOALS | PRESENCE
+
+
+def formulas(metric_set_: MetricSet) -> dict[str, tuple[str, ...]]:
+    """Return formula (LaTeX), range and perhaps a sentence of every order parameter that a set reports."""
+    return dict(metric_set_.formulas) | FORMULAS

@@ -6,6 +6,13 @@ from typing import NamedTuple
 from airflock.core import norm
 
 REPORTS = {"milling": ("", "rotation about the group's own centre, 1 is a mill")}
+FORMULAS = {
+    "milling": (
+        r"\left\langle \left| \frac{1}{N}\sum_i u_i \times h_i \right| \right\rangle_t",
+        "0 to 1; 1 is a torus",
+        "$u_i$ is the unit vector from the group's centre to agent $i$.",
+    ),
+}
 
 
 class Agent(NamedTuple):

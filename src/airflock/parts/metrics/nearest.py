@@ -10,6 +10,20 @@ REPORTS = {
     "r_min": ("m", "smallest distance between two agents"),
     "n_disc": ("", "number of disconnected agents"),
 }
+FORMULAS = {
+    "r_min_mean": (r"\left\langle \frac{1}{N}\sum_i \min_{j \ne i} r_{ij} \right\rangle_t", "0 and more"),
+    "r_min": (
+        r"\min_t \min_{i \ne j} r_{ij}",
+        "0 and more",
+        "The smallest distance that any two agents had at a sample.",
+    ),
+    "n_disc": (
+        r"\left\langle \sum_i \Theta(\min_{j \ne i} r_{ij} - r_{comm}) \right\rangle_t",
+        "0 to N",
+        "Agents with nobody in radio range.",
+    ),
+}
+NEEDS = {"n_disc": ("r_comm",)}
 
 REDUCE = {"nearest2": "min", "least": "min"}  # of Pair, and of Agent
 OVER_TIME = {"r_min": "min"}

@@ -5,6 +5,12 @@ from typing import NamedTuple
 from airflock.core import norm
 
 REPORTS = {"polarisation": ("", "length of the mean heading, 1 is aligned")}
+FORMULAS = {
+    "polarisation": (
+        r"\left\langle \left| \frac{1}{N}\sum_i h_i \right| \right\rangle_t",
+        r"0 to 1; about $1/\sqrt{N}$ in disorder",
+    ),
+}
 
 
 class Sample(NamedTuple):

@@ -14,6 +14,12 @@ REPORTS = {
     "power_solo": ("W", "power of a bird alone"),
     "saving": ("", "share of power that a bird saves by flying together"),
 }
+FORMULAS = {
+    "power": (r"P = \left\langle \frac{1}{N}\sum_i (D^{ind}_i + D^{prof})\,V \right\rangle_t", "above 0"),
+    "power_most": (r"\left\langle \max_i P_i \right\rangle_t", "above 0"),
+    "power_solo": (r"(D^{ind}_{solo} + D^{prof})\,V", "above 0"),
+    "saving": ("1 - P/P_{solo}", "below 1; negative if birds disturb each other"),
+}
 VIOLATES = {"rotation": "forward is along x, in a frame that flies along (wing.frame)"}
 REDUCE = {"most": "max"}
 

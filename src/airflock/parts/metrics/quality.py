@@ -18,6 +18,19 @@ REPORTS = {
     "cns_pol": ("", "consistency in polarization"),
     "quality": ("", "quality of the flock, 1 is best"),
 }
+FORMULAS = {
+    "extension_cm": (r"\left\langle \frac{1}{N}\sum_i |x_i - \bar x| \right\rangle_t", "0 and more"),
+    "polarization_deg": (
+        r"\left\langle \frac{1}{N}\sum_i \arccos(h_i \cdot \hat{\bar h}) \right\rangle_t",
+        "0 to 180",
+        "An angle: 0 is aligned. Not the order parameter polarisation, where 1 is aligned.",
+    ),
+    "f_collision": (r"\left\langle \frac{1}{N}\sum_i \Theta(r_b - \min_{j \ne i} r_{ij}) \right\rangle_t", "0 to 1"),
+    "cns_ext": (r"1 - \frac{1}{N\,e_{max}}\left(\sum_{free} |x_i - \bar x| + k\,N_{coll}\right)", "up to 1; 1 is best"),
+    "cns_pol": (r"1 - \frac{1}{N\,\pi}\left(\sum_{free} \theta_i + \rho\,N_{coll}\right)", "0 to 1; 1 is best"),
+    "quality": (r"\sigma\,\textrm{cns}_{ext} + \gamma\,\textrm{cns}_{pol}", "up to 1; 1 is best"),
+}
+NEEDS = {"f_collision": ("r_b",), "cns_ext": ("max_e", "r_b"), "cns_pol": ("r_b",), "quality": ("max_e", "r_b")}
 COURSES = {
     "extension": ("m", "mean distance to the centre"),
     "polarization": ("rad", "mean angle to the mean heading, 0 is aligned"),

@@ -11,6 +11,19 @@ REPORTS = {
     "phi_lap": ("", "rotation about metrics.centre_x, centre_y; counter-clockwise positive"),
     "phi_lap_abs": ("", "rotation about metrics.centre_x, centre_y; either way"),
 }
+FORMULAS = {
+    "phi_lap": (
+        r"\left\langle \frac{(\bar x \times \bar v)_z}{|\bar x|\, v_{flock}} \right\rangle_t",
+        "about -1 to 1; beyond if the mean flies faster than v_flock",
+        "Laps of the whole flock about the arena's centre, given by `metrics.centre_x` and `metrics.centre_y` (by "
+        "default the origin). Near 0 if it crosses the arena diagonally.",
+    ),
+    "phi_lap_abs": (
+        r"\left\langle \left| \frac{(\bar x \times \bar v)_z}{|\bar x|\, v_{flock}} \right| \right\rangle_t",
+        "about 0 to 1",
+    ),
+}
+NEEDS = {"phi_lap": ("centre_x", "centre_y"), "phi_lap_abs": ("centre_x", "centre_y")}
 
 VIOLATES = {
     "translation": "it is the rotation about the arena's centre",

@@ -15,6 +15,15 @@ REPORTS = {
     "elongation": ("", "long over short axis"),
     "volume": ("m³", "volume; 0 in a plane"),
 }
+FORMULAS = {
+    "area": (
+        r"4\pi\sqrt{\det C_{xy}} \quad \textrm{(in space } 5\pi\sqrt{\det C_{xy}}\textrm{)}",
+        "0 and more",
+        "Ellipse with the second moments $C$ of the positions.",
+    ),
+    "elongation": (r"\sqrt{\lambda_1/\lambda_2}", "1 and more", "Eigenvalues of the second moments in the plane."),
+    "volume": (r"\frac{4}{3}\pi\,5^{3/2}\sqrt{\det C}", "0 and more; 0 in a plane"),
+}
 
 
 class Agent(NamedTuple):

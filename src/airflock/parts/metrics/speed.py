@@ -3,6 +3,9 @@
 from typing import NamedTuple
 
 REPORTS = {"phi_vel": ("m/s", "mean speed")}
+FORMULAS = {
+    "phi_vel": (r"\left\langle \frac{1}{N}\sum_i |v_i| \right\rangle_t", "0 and more; v_flock is best"),
+}
 
 
 class Agent(NamedTuple):

@@ -12,6 +12,18 @@ REPORTS = {
     "unrest": ("m/s", "RMS velocity relative to the flock's mean, after t_settle"),
     "stable": ("", "1 if unrest is below v_settle"),
 }
+FORMULAS = {
+    "crowding": (
+        r"\left\langle \frac{1}{N}\sum_i\sum_j \max\left(1 - r_{ij}/r_{safe}, 0\right)^2 \right\rangle_t",
+        "0 and more",
+    ),
+    "unrest": (
+        r"\sqrt{\left\langle \frac{1}{N}\sum_i |v_i - \bar v|^2 \right\rangle_{t > t_{settle}}}",
+        "0 and more; nan if the flight ends before t_settle",
+    ),
+    "stable": (r"\Theta(v_{settle} - \textrm{unrest})", "0 or 1"),
+}
+NEEDS = {"crowding": ("r_safe",)}
 COURSES = {
     "late": ("", "1 after t_settle"),
     "motion": ("m²/s²", "mean squared velocity relative to the flock's mean, after t_settle"),

@@ -6,6 +6,11 @@ REPORTS = {
     "n_clusters": ("", "number of sub-swarms, stragglers included"),
     "n_stragglers": ("", "number of agents that are alone"),
 }
+FORMULAS = {
+    "n_clusters": (r"\left\langle |\{c\}| \right\rangle_t", "1 to N"),
+    "n_stragglers": (r"\left\langle |\{i : N_i = 1\}| \right\rangle_t", "0 to N"),
+}
+NEEDS = {"n_clusters": ("r_cluster",), "n_stragglers": ("r_cluster",)}
 
 
 class Cluster(NamedTuple):
