@@ -21,7 +21,7 @@ from airflock.core import (
     format_with_unit,
     number_names,
 )
-from airflock.parts import BODIES, FAULTS as KINDS, RADIOS, SENSORS
+from airflock.parts import BODIES, FAULTS as KINDS, RADIOS, SENSORS, SETS, TOPOLOGIES
 from airflock.scenarios import formats
 from airflock.scenarios.fault_entries import FaultTiming
 from airflock.scenarios.groups import LETTERS
@@ -35,7 +35,7 @@ from airflock.support import ScenarioError, to_identifier
 TOP = "top"  # the keys before the first section
 FAMILIES = {"model": MODELS, "body": BODIES, "sensors": SENSORS, "faults": KINDS}  # sections with records by kind
 OF_ALL = number_names(PacketParameters)  # keys of every radio: the section [radio] lists them
-OTHER_RADIOS = {name: radio for name, radio in RADIOS.items() if radio.Parameters is not SECTIONS["radio"]}
+SHARING = {kind.section: kind for kind in (RADIOS, TOPOLOGIES, SETS)}  # whose members share the numbers of a section
 
 
 class Key(NamedTuple):
@@ -102,10 +102,14 @@ def sections() -> Mapping[str, Section]:
     for name, record in SECTIONS.items():
         if name not in FAMILIES:
             result[name] = _section(f"[{name}]", name, record)
-    # Keys of all radios are listed once, under [radio].
-    for name, radio in OTHER_RADIOS.items():
-        found = _section(f'radio.kind = "{name}"', "radio", radio.Parameters, name)
-        result[name] = found._replace(keys=tuple(key for key in found.keys if _last(key) not in OF_ALL))
+    # Keys that all members share are listed once, under their section.
+    for family, kind in SHARING.items():
+        shared = OF_ALL if kind is RADIOS else number_names(SECTIONS[family])
+        for name, record in kind.records.items():
+            if record is not SECTIONS[family]:
+                found = _section(f'{family}.kind = "{name}"', family, record, name)
+                keys_of_record = tuple(key for key in found.keys if _last(key) not in (*shared, "kind"))
+                result[name] = found._replace(keys=keys_of_record)
     groups = "Agents with their own numbers for the law, the body or the sensor."
     result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
     shared = _section("[[faults]]", "faults", FaultTiming)
@@ -154,7 +158,7 @@ def keys(section: str | None = None) -> list[Key]:
         raise ScenarioError([f"{section!r} is no section or key; give its name, such as 'radio' or 'radio.delay'"])
     if section in KINDS:  # all that an entry of this kind may hold, and keys of the same name
         return [*known[section].keys, *known["faults"].keys, *(key for key in every if _last(key) == section)]
-    if section in OTHER_RADIOS:  # behind what all radios have
+    if section in RADIOS and section in known:  # behind what all radios have
         return [*(key for key in known["radio"].keys if _last(key) in OF_ALL), *known[section].keys]
     if section in known and section not in FAMILIES:
         return list(known[section].keys)
@@ -203,6 +207,8 @@ def _declared(before: str, owner: str, record: type) -> list[Key]:
             assert isinstance(declared, (Points, Text))
         meaning, source = declared.meaning, declared.source
         whole = f"{before}.{name}".lstrip(".")
+        if name == "kind" and before in SHARING:
+            kind, options = "choice", (*SHARING[before], OWN)
         keys_of_record.append(Key(whole, owner, kind, default, unit, low, high, options, meaning, source))
     return keys_of_record
 
