@@ -73,7 +73,8 @@ def models(drawn: bool) -> None:
             raise ExtensionError(f"{name}/equations.md: no function {', '.join(missing)} in the model")
         pieces = [f"# `{name}`\n\n**{plain(title)}**\n\n{prose(rest)}\n"]
         pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/parts/laws/{name}/law.py`.\n\n")
-        pieces.append(pictures.shown(pictures.OF_MODEL[name], 1, "A picture of it", there=drawn))
+        example = pictures.of_model(name)
+        pieces += [pictures.shown(example, 1, "A picture of it", there=drawn)] if example else []
         pieces.append("\n## Equations beside code\n")
         for rule, text in written.items():
             code = functions[rule]

@@ -4,16 +4,18 @@ A build that executes no example has no pictures; its pages hold the links alone
 """
 
 import ast
+import re
 
 from sphinx.application import Sphinx
-from writing import DOCS
+from writing import DOCS, LAWS
 
-OF_MODEL = {
-    "vasarhelyi_2018": "10_trajectories", "viragh_2014": "17_two_laws", "reynolds_1987": "50_boids",
-    "vicsek_1995": "20_vicsek", "couzin_2002": "21_couzin_mill", "couzin_2005": "27_informed", "kidger": "30_city",
-    "formation": "40_display", "dimock_2003": "51_formation_flight", "chen_2014": "25_predator_and_prey",
-}  # fmt: skip
 LOW_AND_HIGH = ("25_low_and_high", "26_low_and_high_flights")
+
+
+def of_model(name: str) -> str:
+    """Return the example of the gallery that shows a law, as its page of equations says; "" where none does."""
+    found = re.match(r"Gallery: (\w+)\n", (LAWS / name / "equations.md").read_text(encoding="utf-8"))
+    return found[1] if found else ""
 
 
 def executed(app: Sphinx) -> bool:

@@ -3,6 +3,7 @@ from .certificates.certification import certify as certify
 from .check.models import check_model as check_model, check_types as check_types
 from .check.parts import (
     check_body as check_body,
+    check_fault as check_fault,
     check_metric as check_metric,
     check_radio as check_radio,
     check_sensor as check_sensor,

@@ -8,15 +8,16 @@ import pytest
 
 import airflock
 from airflock.check.models import check_model
-from airflock.check.parts import check_body, check_metric, check_radio, check_sensor, check_topology
+from airflock.check.parts import check_body, check_fault, check_metric, check_radio, check_sensor, check_topology
 from airflock.check.truths import CheckError, UnitScale, unit_factor
 from airflock.core.body import body
+from airflock.core.fault import fault
 from airflock.core.metric import metric
 from airflock.core.model import model
 from airflock.core.radio import radio
 from airflock.core.sensor import sensor
 from airflock.core.topology import topology
-from airflock.parts import BODIES, METRICS, RADIOS, SENSORS, SETS
+from airflock.parts import BODIES, KINDS, LAWS, METRICS, SETS
 from airflock.parts.laws import vasarhelyi_2018, viragh_2014
 from airflock.parts.laws.vasarhelyi_2018 import Sums
 from airflock.scenarios.named_code import MODELS, find_law
@@ -47,19 +48,13 @@ def test_every_fitness_keeps_the_standing_list_or_says_what_it_breaks(name):
     check_metric(name, dimensions=2)
 
 
-@pytest.mark.parametrize("name", BODIES)
-def test_every_body_keeps_the_standing_list(name):
-    assert not check_body(name).broken
-
-
-@pytest.mark.parametrize("name", SENSORS)
-def test_every_sensor_keeps_the_standing_list(name):
-    assert not check_sensor(name).broken
-
-
-@pytest.mark.parametrize("name", RADIOS)
-def test_every_radio_keeps_the_standing_list(name):
-    assert not check_radio(name).broken
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(kind, name) for kind in KINDS if kind not in (LAWS, METRICS, SETS) for name, part in kind.items() if part],
+    ids=lambda value: getattr(value, "noun", value),
+)
+def test_every_part_keeps_the_standing_list_of_its_kind_or_says_what_it_breaks(kind, name):
+    assert set(getattr(airflock, kind.check)(name).broken) == set(kind[name].violates)
 
 
 def test_the_example_of_a_law_of_ones_own_keeps_the_standing_list():
@@ -254,6 +249,36 @@ def always(u0):
     return 1.0
 
 
+def drifts(x, y, z, vx, vy, vz, since):
+    return x + 0.5 * since, y, z, vx, vy, vz
+
+
+def anchored(x, y, z, vx, vy, vz):
+    return 1.01 * x, y, z, vx, vy, vz
+
+
+def endless(since):
+    return 0.0 * since, 1.0
+
+
+def late():
+    return 60.0
+
+
+def idle(cx, cy, cz):
+    return cx, 2 * cy, cz
+
+
+@pytest.mark.parametrize(
+    ("rules", "truth"),
+    [({"sense": drifts}, "units"), ({"tell": anchored}, "place"), ({"clock": endless}, "answers"),
+     ({"leaves": late}, "units"), ({"overrule": idle}, "single precision")],
+)  # fmt: skip
+def test_what_is_planted_in_a_fault_is_found(rules, truth):
+    with pytest.raises(CheckError, match=f"BREAKS  {truth}:"):
+        check_fault(fault(rules, "planted"))
+
+
 @pytest.mark.parametrize(
     ("rules", "truth"),
     [({"missed": beyond}, "chances"), ({"missed": short}, "units"), ({"receive": always, "carry": masted}, "place"),
@@ -305,8 +330,3 @@ def yard(n, r2, met):
 def test_what_is_planted_in_a_topology_is_found(rules, truth):
     with pytest.raises(CheckError, match=f"BREAKS  {truth}:"):
         check_topology(topology(rules, "planted"))
-
-
-@pytest.mark.parametrize("kind", ["nearest", "voronoi", "visible", "strongest"])
-def test_our_topologies_hold(kind):
-    assert check_topology(kind).broken == ()

@@ -1,4 +1,4 @@
-"""The standing lists of bodies, sensors, radios, topologies and order parameters, one table of truths a kind."""
+"""The standing lists of bodies, sensors, radios, topologies, faults and order parameters, a table of truths a kind."""
 
 import math
 from collections.abc import Mapping
@@ -14,17 +14,20 @@ from airflock.check.truths import (
     Trials,
     TruthTable,
     UnitScale,
+    numbers_text,
     parameters_with_values,
     rescaled,
     rescaled_scenario,
     rotation_about_vertical,
     run_truths,
+    standing_list,
     unit_factor,
 )
 from airflock.core import (
     COMMANDS,
     COMPONENTS,
     FAR,
+    FAULT_RULES,
     RULES as RADIO_RULES,
     TINY,
     VOCABULARY,
@@ -39,7 +42,7 @@ from airflock.core import (
     declarations,
 )
 from airflock.engine import measure_frames
-from airflock.parts import BODIES, RADIOS, SENSORS, SETS, TOPOLOGIES
+from airflock.parts import BODIES, FAULTS, RADIOS, SENSORS, SETS, TOPOLOGIES
 from airflock.parts.aero import Parameters as Wing
 from airflock.parts.topologies import Parameters as TopologyParameters
 from airflock.scenarios import CallerParts, Part, Scenario, build_scenario, check_seed, part_from_caller
@@ -85,6 +88,7 @@ class Motion(NamedTuple):
         return {**numbers, "dt": self.dt, "memory": memory, "wing": self.wing}
 
 
+@standing_list(BODIES)
 def check_body(body: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a body and return a report with one line a truth.
 
@@ -92,27 +96,6 @@ def check_body(body: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     finite; a halved time step halves the error; in other units it is the same motion; the rule
     stays in single precision. A body that rightly breaks one of them says which and why: VIOLATES =
     {"mirror": "a propeller turns one way"}.
-
-    Parameters
-    ----------
-    body : Body, module, class, mapping or str
-        A body: a Body, a namespace such as globals(), a name of ours, or a file that ends in .py.
-    parameters : mapping, optional
-        Values that differ from the defaults, by name.
-    seed : int
-        Of the random motions; it stands in every mismatch.
-
-    Returns
-    -------
-    Report
-        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
-
-    Raises
-    ------
-    CheckError
-        If a truth does not hold that the body does not declare.
-    RuleError, ScenarioError, ParameterError
-        If what is checked cannot be read, or a value is none of its numbers.
 
     Examples
     --------
@@ -191,6 +174,7 @@ class Track(NamedTuple):
     number: int
 
 
+@standing_list(SENSORS)
 def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a sensor and return a report with one line a truth.
 
@@ -198,27 +182,6 @@ def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, se
     no error; in other units it is the same measurement; the rule stays in single precision. A
     sensor that rightly breaks one of them says which and why: VIOLATES = {"place": "a beacon stands
     in the origin"}.
-
-    Parameters
-    ----------
-    sensor : Sensor, module, class, mapping or str
-        A sensor: a Sensor, a namespace such as globals(), a name of ours, or a file that ends in .py.
-    parameters : mapping, optional
-        Values that differ from the defaults, by name.
-    seed : int
-        Of the random tracks; it stands in every mismatch.
-
-    Returns
-    -------
-    Report
-        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
-
-    Raises
-    ------
-    CheckError
-        If a truth does not hold that the sensor does not declare.
-    RuleError, ScenarioError, ParameterError
-        If what is checked cannot be read, or a value is none of its numbers.
 
     Examples
     --------
@@ -305,6 +268,7 @@ LENGTHS, TIMES = ("distance", "dx", "dy", "dz", "ex", "ey", "ez", "x", "y", "z")
 SPEEDS = ("vx", "vy", "vz", "evx", "evy", "evz")
 
 
+@standing_list(RADIOS)
 def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a radio and return a report with one line a truth.
 
@@ -312,27 +276,6 @@ def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed
     what is shifted is carried on shifted; in other units it is the same radio; rules stay in single
     precision. A radio that rightly breaks one of them says which and why: VIOLATES = {"place": "a
     mast stands in the origin"}.
-
-    Parameters
-    ----------
-    radio : Radio, module, class, mapping or str
-        A radio: a Radio, a namespace such as globals(), a name of ours, or a file that ends in .py.
-    parameters : mapping, optional
-        Values that differ from the defaults, by name.
-    seed : int
-        Of the random pairs; it stands in every mismatch.
-
-    Returns
-    -------
-    Report
-        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
-
-    Raises
-    ------
-    CheckError
-        If a truth does not hold that the radio does not declare.
-    RuleError, ScenarioError, ParameterError
-        If what is checked cannot be read, or a value is none of its numbers.
 
     Examples
     --------
@@ -425,6 +368,7 @@ class Neighbours(NamedTuple):
         return Neighbours(*(column[order] for column in self))
 
 
+@standing_list(TOPOLOGIES)
 def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a topology and return a report with one line a truth.
 
@@ -432,27 +376,6 @@ def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *
     turned about the vertical it is the same; in other units it is the same; where it says that it
     is NEAR, nobody farther matters. A topology that rightly breaks one of them says which and why:
     VIOLATES = {"turned": "whoever is east is met"}.
-
-    Parameters
-    ----------
-    topology : Topology, module, class, mapping or str
-        A topology: a Topology, a namespace such as globals(), a name of ours, or a file that ends in .py.
-    parameters : mapping, optional
-        Values that differ from the defaults, by name.
-    seed : int
-        Of the random flocks; it stands in every mismatch.
-
-    Returns
-    -------
-    Report
-        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
-
-    Raises
-    ------
-    CheckError
-        If a truth does not hold that the topology does not declare.
-    RuleError, ScenarioError, ParameterError
-        If what is checked cannot be read, or a value is none of its numbers.
 
     Examples
     --------
@@ -525,6 +448,76 @@ def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *
         "units": ("in another unit of length it is the same", trials.units),
     }
     return run_truths(f"topology {part.name}", truths, part.violates)
+
+
+CASES = 40  # random states that each truth is tried on
+FAULT_UNITS = {"x": "m", "y": "m", "z": "m", "reach": "m", "since": "s", "dt": "s"}  # of arguments; others: m/s
+
+
+@standing_list(FAULTS)
+def check_fault(fault: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
+    """Run the standing list of truths on a kind of fault and return a report with one line a truth.
+
+    Each rule returns as many finite numbers as its stage needs; what is shifted is believed
+    shifted; in other units it is the same fault; rules stay in single precision. A fault that
+    rightly breaks one of them says which and why: VIOLATES = {"place": "a jammer stands in the
+    origin"}.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.check_fault("motor").broken
+    ()
+    """
+    part = find_part(FAULTS, fault)
+    f = parameters_with_values(part.Parameters, parameters, "fault")
+    rng = np.random.default_rng(check_seed(seed))
+    names = {name for kind in part.rules for name in VOCABULARY[kind]} - {"f"}
+    # A command is that of the law; a velocity stands for all.
+    units = {name: FAULT_UNITS.get(name.removeprefix("at_"), "m/s") for name in sorted(names)}
+    answers = {"radio": ["m"] * 2, "clock": ["s"], "leaves": ["s"], "overrule": ["m/s"] * 3, "motion": ["m/s"] * 3}
+    shift = dict(zip(AXES, (1234.0, -567.0, 89.0), strict=True))
+
+    def draw() -> dict[str, Any]:
+        given = {name: float(rng.normal(0.0, 5.0)) for name in units}
+        return given | {"since": float(rng.uniform(0.0, 100.0)), "reach": float(rng.uniform(1.0, 100.0)), "dt": 0.02}
+
+    def answer(f: Any, case: tuple[str, Mapping[str, Any]]) -> Array:
+        made = np.atleast_1d(np.array(call_rule(part.rules[case[0]], case[0], {**case[1], "f": f}, part.name), float))
+        return np.maximum(made, 0.0) if case[0] == "radio" else made  # a negative range means none at all
+
+    def scale(to: UnitScale, case: tuple[str, Mapping[str, Any]]) -> tuple[Any, Array]:
+        by = answers.get(case[0], ["m"] * 3 + ["m/s"] * 3)
+        scaled = {name: value * unit_factor(units[name], to) for name, value in case[1].items() if name in units}
+        return (case[0], scaled), np.array([unit_factor(unit, to) for unit in by])
+
+    def finite() -> str:
+        for kind, given in trials.cases:
+            made, count = answer(f, (kind, given)), FAULT_RULES[kind][0]
+            if len(made) != count or not np.isfinite(made).all():
+                return f"seed {seed}: {kind} gives ({numbers_text(made)}) instead of {count} finite numbers"
+        return ""
+
+    def shifted(case: tuple[str, Mapping[str, Any]]) -> tuple[str, Mapping[str, Any]]:
+        by = {name: shift[name[-1]] for name in case[1] if name in ("x", "y", "z", "at_x", "at_y", "at_z")}
+        return case[0], {**case[1], **{name: case[1][name] + step for name, step in by.items()}}
+
+    givens = [draw() for _ in range(CASES)]
+    cases = [(kind, given) for given in givens for kind in part.rules]
+    moved = np.array([*shift.values(), 0.0, 0.0, 0.0])
+    placed = [case for case in cases if case[0] in ("sense", "tell")]
+    trials = Trials(part.name, part.rules, f, answer, cases, seed, scale, separate=True)
+    truths: TruthTable = {
+        "rule": ("every rule can be compiled", trials.compiles),
+        "answers": ("each rule returns the numbers that its stage needs", finite),
+        "place": (
+            "shifting the flight shifts what is believed",
+            lambda: trials.same(shifted, lambda state: state + moved, placed),
+        ),
+        "units": ("in other units of length and time it is the same", trials.units),
+        "single precision": ("rules do not turn float32 into doubles", lambda: trials.single("f", givens[:5])),
+    }
+    return run_truths(f"fault {part.name}", truths, part.violates)
 
 
 AGENTS, INSTANTS, TRIED = 6, 5, 8

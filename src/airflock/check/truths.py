@@ -7,12 +7,22 @@ from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core import Points, Quantity, argument_names, choices, component_names, declarations, law, number_names
+from airflock.core import (
+    Kind,
+    Points,
+    Quantity,
+    argument_names,
+    choices,
+    component_names,
+    declarations,
+    law,
+    number_names,
+)
 from airflock.engine import DriverSource
 from airflock.scenarios import Scenario, schema, settings_dict
 from airflock.support import AirflockError, RuleError, ScenarioError
@@ -20,6 +30,7 @@ from airflock.support import AirflockError, RuleError, ScenarioError
 # name → what it says, and a check that returns what is wrong, empty if nothing is
 TruthTable = dict[str, tuple[str, Callable[[], str]]]
 Array = NDArray[np.float64]
+Check = TypeVar("Check", bound=Callable[..., Any])
 CLOSE = 1e-9  # more than rounding
 MIRROR: Array = np.diag([1.0, -1.0, 1.0])
 
@@ -66,6 +77,42 @@ class Report:
     def broken(self) -> tuple[str, ...]:
         """Names of the truths that do not hold, declared or not."""
         return tuple(truth.name for truth in self.truths if truth.mismatch)
+
+
+SHARED_SECTIONS = """Parameters
+    ----------
+    {noun} : {member}, module, class, mapping or str
+        A {noun}: a {member}, a namespace such as globals(), a name of ours, or a file that ends in .py.
+    parameters : mapping, optional
+        Values that differ from the defaults, by name.
+    seed : int
+        Of the random cases; it stands in every mismatch.
+
+    Returns
+    -------
+    Report
+        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
+
+    Raises
+    ------
+    CheckError
+        If a truth does not hold that the {noun} does not declare.
+    RuleError, ScenarioError, ParameterError
+        If what is checked cannot be read, or a value is none of its numbers.
+
+    """
+
+
+def standing_list(kind: Kind[Any]) -> Callable[[Check], Check]:
+    """Return a decorator that adds to the docstring of a check what all share: arguments, result and errors."""
+
+    def add(check: Check) -> Check:
+        noun = kind.noun.rpartition(" ")[2]  # a kind of fault is checked as a fault
+        sections = SHARED_SECTIONS.format(noun=noun, member=kind.member.__name__)
+        check.__doc__ = (check.__doc__ or "").replace("Examples\n", f"{sections}Examples\n", 1)
+        return check
+
+    return add
 
 
 def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Report:

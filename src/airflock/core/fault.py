@@ -7,7 +7,7 @@ scenario names its kind.
 
 from collections import namedtuple
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from typing import Any
@@ -71,6 +71,7 @@ class Fault:
     overrule   : what it makes of a command, after the law
     motion     : what it makes of a motion step, after the body
     leaves     : when the agent drops out of the flight for good
+    violates   : truths of `airflock.check_fault` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
@@ -83,6 +84,7 @@ class Fault:
     motion: Callable[..., Any] | None = None
     leaves: Callable[..., float] | None = None
     doc: str = ""
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, *(getattr(self, kind) for kind in FAULT_RULES)))
@@ -170,7 +172,7 @@ def fault(namespace: Any, name: str = "") -> Fault:
     taken = [key for key in number_names(record) if key in ENTRY_KEYS]
     if taken:
         raise RuleError(f"fault {name}: Parameters.{taken[0]}: the name has a meaning of its own in [[faults]]")
-    made = Fault(name, record, doc=str(found.get("__doc__") or ""), **rules)
+    made = Fault(name, record, doc=str(found.get("__doc__") or ""), violates=dict(found.get("VIOLATES", {})), **rules)
     # A driver keeps the onset and the disturbed states of an agent in columns of these names.
     kept = [
         key

@@ -47,7 +47,7 @@ TOPOLOGIES = Kind(
     f"{PARTS}topologies", "topology", _topology, Topology, ("meet",), "topology", "range",
     fixed={"range": None}, check="check_topology",
 )  # fmt: skip
-FAULTS = Kind(f"{PARTS}faults", "kind of fault", fault, Fault, FAULT_RULES)
+FAULTS = Kind(f"{PARTS}faults", "kind of fault", fault, Fault, FAULT_RULES, check="check_fault")
 KINDS: tuple[Kind[Any], ...] = (LAWS, BODIES, SENSORS, RADIOS, TOPOLOGIES, FAULTS, METRICS, SETS)
 
 # A law that commands an acceleration needs another body than one that commands a velocity.

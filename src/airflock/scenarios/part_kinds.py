@@ -43,7 +43,7 @@ def part_by_name(
     """Find a part by its name, or in a file, which runs only with trust; return it, or None, with the errors."""
     if name in kind:
         return kind[name], []
-    key = f"{kind.section}.kind"
+    key = f"{kind.section}.kind".lstrip(".")
     # Only the ending makes a name a file: a misspelt name must never run code.
     if isinstance(name, str) and name.endswith(".py"):
         try:
