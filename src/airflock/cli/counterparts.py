@@ -369,5 +369,5 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
 LIBRARY_FUNCTIONS = (
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
     "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor",
-    "check_radio", "check_topology", "quantity", "choice",
+    "check_radio", "check_topology", "check_fault", "quantity", "choice",
 )  # fmt: skip

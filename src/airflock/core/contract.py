@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 from airflock.core.parameters import Parameters, number_names
 from airflock.support import AirflockError, RuleError, describe_error, shortened, suggest
 
-T = TypeVar("T")
+Part = TypeVar("Part", covariant=True)
 COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": "1"}  # and their units
 REDUCTIONS = ("sum", "min", "max")
 OVER_TIME = ("mean", *REDUCTIONS)  # how the samples of a flight combine
@@ -51,7 +51,7 @@ def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str
 
 
 @dataclass(frozen=True, eq=False)
-class Kind(Mapping[str, T]):
+class Kind(Mapping[str, Part]):
     """A kind of part: its members by name, and where a scenario names one.
 
     Members are the files and folders of one folder of the package, and of the folder of the same name in every
@@ -73,19 +73,19 @@ class Kind(Mapping[str, T]):
 
     folder: str
     noun: str
-    make: Callable[..., T]
-    member: type[T]
+    make: Callable[..., Part]
+    member: type[Part]
     rules: Collection[str]
     section: str = ""
     default: str = ""
     fixed: Mapping[str, Any] = field(default_factory=dict)
     shared: tuple[str, ...] | None = ()
-    take: Callable[[Any], T] | None = None
+    take: Callable[[Any], Part] | None = None
     check: str = ""
 
     __hash__ = object.__hash__
 
-    def __getitem__(self, name: str) -> T:
+    def __getitem__(self, name: str) -> Part:
         return self._members[0][name]
 
     def __contains__(self, name: object) -> bool:
@@ -103,9 +103,9 @@ class Kind(Mapping[str, T]):
         return self._members[1]
 
     @cached_property
-    def _members(self) -> tuple[dict[str, T], dict[str, str]]:
+    def _members(self) -> tuple[dict[str, Part], dict[str, str]]:
         """Gather the members by name, and the errors of those that are left out."""
-        members: dict[str, T] = {}
+        members: dict[str, Part] = {}
         errors: dict[str, str] = {}
         own = self.folder.rpartition(".")[2]
         # The package comes first, so that no installed one can put another rule behind a known name.

@@ -2,12 +2,14 @@
 from .kinds import (
     BODIES as BODIES,
     FAULTS as FAULTS,
-    KINDS as KINDS,
     LAWS as LAWS,
-    METRICS as METRICS,
     RADIOS as RADIOS,
     SENSORS as SENSORS,
-    SETS as SETS,
     TOPOLOGIES as TOPOLOGIES,
     default_body as default_body,
+)
+from .metrics.metric_sets import (
+    KINDS as KINDS,
+    METRICS as METRICS,
+    SETS as SETS,
 )

@@ -1,4 +1,7 @@
-"""The kinds of parts that the package knows; each finds its members in its folder and in installed packages."""
+"""The kinds of parts that fly: each finds its members in its folder and in installed packages.
+
+Those that measure are beside the metrics, which are not on board.
+"""
 
 from dataclasses import replace
 from typing import Any
@@ -21,7 +24,6 @@ from airflock.core import (
     sensor,
     topology,
 )
-from airflock.parts.metrics.metric_sets import METRICS, SETS
 from airflock.parts.radios.constant import CONSTANT
 
 PARTS = "airflock.parts."
@@ -48,7 +50,6 @@ TOPOLOGIES = Kind(
     fixed={"range": None}, check="check_topology",
 )  # fmt: skip
 FAULTS = Kind(f"{PARTS}faults", "kind of fault", fault, Fault, FAULT_RULES, check="check_fault")
-KINDS: tuple[Kind[Any], ...] = (LAWS, BODIES, SENSORS, RADIOS, TOPOLOGIES, FAULTS, METRICS, SETS)
 
 # A law that commands an acceleration needs another body than one that commands a velocity.
 DEFAULT_BODIES = {"velocity": BODIES.default, "acceleration": "steered", "heading": "heading"}

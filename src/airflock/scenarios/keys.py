@@ -103,13 +103,12 @@ def sections() -> Mapping[str, Section]:
         if name not in FAMILIES:
             result[name] = _section(f"[{name}]", name, record)
     # Keys that all members share are listed once, under their section.
-    for family, kind in SHARING.items():
-        shared = OF_ALL if kind is RADIOS else number_names(SECTIONS[family])
-        for name, record in kind.records.items():
+    for family, sharing in SHARING.items():
+        common = OF_ALL if sharing is RADIOS else number_names(SECTIONS[family])
+        for name, record in sharing.records.items():
             if record is not SECTIONS[family]:
-                found = _section(f'{family}.kind = "{name}"', family, record, name)
-                keys_of_record = tuple(key for key in found.keys if _last(key) not in (*shared, "kind"))
-                result[name] = found._replace(keys=keys_of_record)
+                own = _section(f'{family}.kind = "{name}"', family, record, name)
+                result[name] = own._replace(keys=tuple(k for k in own.keys if _last(k) not in (*common, "kind")))
     groups = "Agents with their own numbers for the law, the body or the sensor."
     result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
     shared = _section("[[faults]]", "faults", FaultTiming)

@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from airflock.core import Model, bound_values, declarations, model
-from airflock.parts import LAWS as MODELS
+from airflock.parts import LAWS
 from airflock.support import (
     ParameterError,
     RuleError,
@@ -32,6 +32,8 @@ from airflock.support import (
     shortened,
     to_identifier,
 )
+
+MODELS = LAWS
 
 
 def find_law(kind: Any, folder: Path | None = None, *, where: str = "model.kind", trust: bool = False) -> Model:

@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import Any
 
 from airflock.core import Kind, Metric, MetricSet, Parameters as Record, declarations, metric, namespace_names
+from airflock.parts.kinds import BODIES, FAULTS, LAWS, RADIOS, SENSORS, TOPOLOGIES
 from airflock.parts.metrics import parameters
 from airflock.support import RuleError
 
@@ -152,6 +153,8 @@ SETS = Kind(
     "airflock.parts.metric_sets", "set of order parameters", metric_set, MetricSet, ("METRICS",), "metrics",
     "vasarhelyi", shared=None, take=to_metric_set, check="check_metric",
 )  # fmt: skip
+KINDS: tuple[Kind[Any], ...] = (LAWS, BODIES, SENSORS, RADIOS, TOPOLOGIES, FAULTS, METRICS, SETS)  # all
+
 FORMULAS = {  # as those of a metric, of what the engine keeps
     "goals_reached": (
         r"\textrm{goals that the centre of the flock came to}",
