@@ -13,13 +13,12 @@ from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
-from airflock.parts.bodies.body_kinds import BODIES as KNOWN_BODIES
 from numpy.typing import NDArray
 
 from airflock.core.model import Model
 from airflock.core.parameters import Choice, Parameters, Quantity, choices, declarations, quantity
 from airflock.core.topology import topology as topology_of_ones_own
-from airflock.parts import FAULTS as KINDS, RADIOS, SENSORS
+from airflock.parts import BODIES as KNOWN_BODIES, FAULTS as KINDS, RADIOS, SENSORS
 from airflock.scenarios.named_code import MODELS, find_law
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario import Scenario
@@ -90,7 +89,7 @@ def drawn(rng: Random) -> Draw:
 
 def settings(rng: Random) -> tuple[dict[str, Any], NDArray[np.float64] | None]:
     """Keys of a scenario that is mostly valid, and a start or None."""
-    kind = rng.choice(MODELS)
+    kind = rng.choice([*MODELS])
     length, reach, speed = SCALES[kind]
     dt = rng.choice((0.02, 0.05))
     keys: dict[str, Any] = {
@@ -442,7 +441,7 @@ def options(record: type) -> dict[str, tuple[str, ...]]:
 OPTIONS = {section: options(record) for section, record in {**SECTIONS, "flight": Flight}.items()}
 OPTIONS |= {kind: options(find_law(kind).Parameters) for kind in MODELS}
 OPTIONS |= {
-    "model": {"kind": MODELS},
+    "model": {"kind": tuple(MODELS)},
     "sensors": {"kind": tuple(SENSORS)},
     "body": {"kind": tuple(KNOWN_BODIES), **options(KNOWN_BODIES["heading"].Parameters)},
 }
