@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from airflock.engine import plan_of
-from airflock.parts.laws import viragh_2014
+from airflock.parts.laws.viragh_2014 import law as viragh_2014
 from airflock.scenarios.files import load
 from flocks import interpreted as flown, scenario
 from inside import interpreted

@@ -46,7 +46,7 @@ def test_names_and_files_fly_like_the_scenarios_that_they_stand_for(tmp_path):
 
 
 def test_a_law_may_be_given_by_its_name_or_its_file(tmp_path):
-    from airflock.parts.laws import viragh_2014
+    from airflock.parts.laws.viragh_2014 import law as viragh_2014
 
     by_name = airflock.load(NAME, law="viragh_2014")
     assert by_name.model.name == "viragh_2014" and by_name.document["model"] == {"kind": "viragh_2014"}

@@ -113,7 +113,7 @@ def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
 
 
 def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flown_again_with_it(tmp_path, monkeypatch):
-    from airflock.parts.laws import viragh_2014
+    from airflock.parts.laws.viragh_2014 import law as viragh_2014
     from airflock.recordings.recording_files import replay_recording
 
     (tmp_path / "sub").mkdir()
