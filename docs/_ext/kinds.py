@@ -1,9 +1,9 @@
-"""Pages of kinds: every fault and every topology with its rule and its numbers."""
+"""Pages of kinds: every fault and every topology with its rule and its numbers, every format of tracks and logs."""
 
 from inspect import getdoc, getsource
 from sys import modules
 
-from writing import key_table, plain, prose, put
+from writing import key_table, plain, prose, put, table
 
 
 def faults() -> None:
@@ -25,6 +25,16 @@ def faults() -> None:
             pieces.append(f"```python\n{getsource(rule)}```\n\n")
         pieces.append(key_table(known[name].keys) if known[name].keys else "It has no numbers of its own.\n")
     put("fault_kinds.md", "".join(pieces))
+
+
+def formats() -> None:
+    """Write a row for each format of tracks and logs: endings, what is read, packages beside those of Airflock."""
+    from airflock.recordings.imports import formats as known
+
+    heads = ("ending", "format", "read as", "needs")
+    rows = [(", ".join(f"`{end}`" for end in one.suffixes), one.name, one.about, one.needs) for one in known()]
+    text = "Every format that `airflock import` reads; [how to import](../tracks.md).\n\n"
+    put("formats.md", f"# Formats of tracks and logs\n\n{text}{table(heads, rows)}")
 
 
 def topologies() -> None:

@@ -37,6 +37,7 @@ def write_all(drawn: bool = False) -> None:
     robots()
     kinds.faults()
     kinds.topologies()
+    kinds.formats()
     vocabulary()
     keys()
     commands()

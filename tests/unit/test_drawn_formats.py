@@ -3,20 +3,25 @@
 import json
 import re
 import struct
+import sys
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pandas as pd
 import pytest
 import scipy.io
 import xarray as xr
+from typer.testing import CliRunner
 
 import airflock
-from airflock.cli import estimate_verbs
-from airflock.recordings import reader_process
-from airflock.recordings.imports import common_frame, load_tracks as loading
+from airflock.cli.main import app
+from airflock.recordings import imports
+from airflock.recordings.imports import common_frame
 from airflock.support.errors import RecordingError
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "_ext"))
+import kinds  # noqa: E402
+import writing  # noqa: E402
 
 DRAWN = 50
 OF_HDF5 = 6  # each starts a process
@@ -496,7 +501,7 @@ def days_or_months_first(rng, tmp_path):
     return (
         csv(tmp_path, table[:60].assign(Date=f"{day:02d}/{month:02d}/2026")),
         {},
-        "may have the day or the month first; write dates as 2026-05-04",
+        "may have the day or the month first; write --time-unit dmy, or --time-unit mdy",
     )
 
 
@@ -542,6 +547,144 @@ def frames_without_a_rate(rng, tmp_path):
         {"map": {"t": "frame"}} if rng.random() < 0.5 else {},
         "counts frames; say how many a second",
     )
+
+
+@question
+def headings_in_the_place_of_heights(rng, tmp_path):
+    truth = Truth(rng, rate=10.0)
+    turn = np.sign(np.cross(truth.velocity[0], truth.velocity[1]))
+    course = np.arctan2(truth.velocity[..., 1], truth.velocity[..., 0])
+    course += rng.normal(0.0, rng.uniform(0.0, 0.2), course.shape)
+    assert turn.any()
+    angle = rng.choice([1.0, -1.0]) * course + rng.choice([0.0, np.pi / 2.0])
+    angle = angle % (2.0 * np.pi) if rng.random() < 0.5 else (angle + np.pi) % (2.0 * np.pi) - np.pi
+    angle = np.degrees(angle) if rng.random() < 0.5 else angle
+    np.save(tmp_path / "a.npy", np.concatenate([truth.place, angle[..., None]], axis=-1))
+    return tmp_path / "a.npy", {"fps": 10.0, "unit": "m"}, "goes as headings do"
+
+
+@kind
+def array_in_space(rng, tmp_path):
+    """Heights that rise, fall and turn with the motion are no headings."""
+    truth = Truth(rng)
+    phase = rng.uniform(0.2, 2.0) * truth.t[:, None] + rng.uniform(0.0, 6.3, len(truth.names))
+    height = rng.uniform(0.5, 200.0) + rng.uniform(0.1, 5.0) * np.sin(phase) + rng.uniform(-1.0, 1.0) * truth.t[:, None]
+    height += rng.normal(0.0, 0.01, height.shape)
+    np.save(tmp_path / "a.npy", np.concatenate([truth.place, height[..., None]], axis=-1))
+    return truth, tmp_path / "a.npy", {"fps": truth.rate, "unit": "m"}
+
+
+@question
+def minutes_without_a_unit(rng, tmp_path):
+    truth = Truth(rng, rate=float(rng.choice([10.0, 20.0, 25.0])))
+    table = truth.long(t=rng.choice(["t", "time"]), x="x_m", y="y_m", times=truth.t / 60.0)
+    return (
+        csv(tmp_path, table),
+        {},
+        "flies or films: Write --time-unit min; or if times are days",
+    )
+
+
+@question
+def milliseconds_without_a_unit(rng, tmp_path):
+    truth = Truth(rng)
+    x, y, unit = [("x_m", "y_m", ""), ("x", "y", ""), ("x", "y", "m")][rng.integers(3)]
+    table = truth.long(t=rng.choice(["timestamp", "time"]), x=x, y=y, times=(1e3 * truth.t).astype(int))
+    return csv(tmp_path, table), {"unit": unit} if unit else {}, "ms? Write --time-unit ms; if they are seconds"
+
+
+def received(rng):
+    """Two receivers of one drone, some metres and milliseconds apart."""
+    truth = Truth(rng, count=1)
+    table = truth.long(x="x_m", y="y_m").drop(columns="id")
+    shift = rng.uniform(-2.0, 2.0, 2)
+    late = float(rng.choice([0.0, 0.4])) / truth.rate
+    other = table.assign(t=table["t"] + late, x_m=table["x_m"] + shift[0], y_m=table["y_m"] + shift[1])
+    header, names = str(rng.choice(["device_id", "device", "receiver_name"])), [("a", "b"), (7, 4)][rng.integers(2)]
+    both = [table.assign(**{header: names[0]}), other.assign(**{header: names[1]})]
+    return truth, pd.concat(both).sort_values("t", kind="stable"), header, sorted(names, key=str) == list(names)
+
+
+@question
+def receivers_by_an_unknown_name(rng, tmp_path):
+    _, table, header, _ = received(rng)
+    return csv(tmp_path, table), {}, f"at the same times: write --map receiver:={header} if they are receivers"
+
+
+@kind
+def receivers_by_map(rng, tmp_path):
+    first = False
+    while not first:  # numbers are read in their order, names in that of the rows
+        truth, table, header, first = received(rng)
+    return truth, csv(tmp_path, table), {"map": {"receiver": header}}
+
+
+LETTERS = (["A", "B", "C"], ["C", "V", "U"], ["leader", "follower", "Stray"])
+
+
+def pairs_of_columns(rng, truth):
+    names = LETTERS[rng.integers(len(LETTERS))]
+    table = {"t_s": truth.t}
+    for k, name in enumerate(names):
+        table |= {f"{name}_{axis}_m": truth.place[:, k, c] for c, axis in enumerate("xy")}
+    return names, pd.DataFrame(table)
+
+
+@question
+def pairs_of_columns_by_letters(rng, tmp_path):
+    names, table = pairs_of_columns(rng, Truth(rng, count=3))
+    words = (
+        f"has 3 keypoints ({', '.join(names)}); choose one: --keypoint {names[0]}; or if each is an individual"
+    )
+    return csv(tmp_path, table), {}, words
+
+
+@kind
+def pairs_of_columns_by_map(rng, tmp_path):
+    truth = Truth(rng, count=3)
+    truth.names, table = pairs_of_columns(rng, truth)
+    return truth, csv(tmp_path, table), {"map": {"id": "columns"}}
+
+
+@kind
+def times_named_by_their_unit(rng, tmp_path):
+    truth = Truth(rng)
+    unit = str(rng.choice(["seconds", "minutes", "hours", "milliseconds", "msecs"]))
+    words = WORDS["time"] | {"msecs": 1e3}
+    return truth, csv(tmp_path, truth.long(t=unit, x="x_m", y="y_m", times=truth.t * words[unit])), {}
+
+
+@kind
+def dates_in_an_order_that_is_given(rng, tmp_path):
+    truth = Truth(rng, rate=1.0)
+    day, month, order = int(rng.integers(1, 13)), int(rng.integers(1, 13)), str(rng.choice(["dmy", "mdy"]))
+    when = pd.Timestamp(2026, month, day, 10) + pd.to_timedelta(truth.t, unit="s")
+    form = str(rng.choice(["%d/%m/%Y", "%d-%m-%Y"]))
+    form = form if order == "dmy" else form[3:5] + form[2] + form[:2] + form[5:]
+    if rng.random() < 0.5:
+        table = truth.long(t="time", x="x_m", y="y_m", times=when.strftime(f"{form} %H:%M:%S").to_numpy())
+    else:
+        table = truth.long(t="Time", x="x_m", y="y_m", times=when.strftime("%H:%M:%S").to_numpy())
+        table["Date"] = np.repeat(when.strftime(form).to_numpy(), len(truth.names))
+    return truth, csv(tmp_path, table), {} if day == month and form[0] == "%" else {"time_unit": order}
+
+
+@kind
+def hour_that_comes_twice(rng, tmp_path):
+    """Local times without a zone, in the night in which summer time ends."""
+    zone, night = [("Europe/Budapest", "2026-10-25 00:30"), ("America/New_York", "2026-11-01 05:30"),
+                   ("Australia/Sydney", "2026-04-04 15:30")][rng.integers(3)]  # fmt: skip
+    truth = Truth(rng, rate=1.0)
+    step = int(rng.choice([1, 60, 300, 1800, 3600]))
+    begin = pd.Timestamp(night, tz="UTC") - pd.Timedelta(seconds=step * int(rng.integers(1, 30)))
+    truth.t = truth.t * step
+    local = (begin + pd.to_timedelta(truth.t, unit="s")).tz_convert(zone).tz_localize(None)
+    if rng.random() < 0.5:
+        table = truth.long(t="timestamp", x="x_m", y="y_m", times=local.strftime("%Y-%m-%d %H:%M:%S").to_numpy())
+    else:
+        table = truth.long(t="Time", x="x_m", y="y_m", times=local.strftime("%H:%M:%S").to_numpy())
+        table["Date"] = np.repeat(local.strftime("%Y-%m-%d").to_numpy(), len(truth.names))
+    return truth, csv(tmp_path, table), {}
 
 
 @question
@@ -694,6 +837,13 @@ def speeds_in_a_small_unit(rng):
     truth, own = flown(rng)
     factor = float(rng.choice([100.0, 3.6]))
     return truth, own | {name: factor * own[name] for name in ("vx", "vy", "vz")}, {}
+
+
+@faulty
+def times_without_a_unit(rng):
+    truth, own = flown(rng)
+    table = {name: own[name] for name in ("t", "x", "y", "z")}
+    return truth, table | {"t": own["t"] * float(rng.choice([1e3, 1 / 60]))}, {"unit": "m"}
 
 
 @faulty
@@ -861,9 +1011,80 @@ def test_no_exported_name_is_a_formula(tmp_path, text):
     assert f"'{text}" in names and "ok" in names and not any(name[:1] in "=+-@\t " for name in names)
 
 
-def test_suffixes_of_the_readers_are_in_the_help_and_in_the_docs():
-    docs = (Path(__file__).parents[2] / "docs" / "tracks.md").read_text()
-    known = get_args(estimate_verbs.Files)[1].help
-    for suffix in loading.READERS:
-        assert f"`{suffix}`" in docs and (suffix in known or suffix in (".tsv", ".txt", ".hdf5")), suffix
-    assert set(reader_process.FOREIGN) <= set(loading.READERS)
+@pytest.mark.parametrize("rate", [1e5, 1e7, 1e8])
+def test_a_rate_that_nobody_means_is_refused_in_one_line(rate):
+    table = Truth(np.random.default_rng(1), rate=20.0).long(x="x_m", y="y_m")
+    line = refusal(table, rate=rate)
+    assert line.startswith(f"--rate {rate:g}: ") and line.endswith("write --rate 2e+04 or less")
+
+
+# Formats: a reader in one file is in the import, the help, the docs and the errors.
+READER = """
+from pathlib import Path
+import numpy as np
+from airflock.recordings.imports import reader
+from airflock.recordings.imports.track import ImportedTrack
+
+@reader("diary of a bird", suffixes=(".bird",), sniff=lambda start: start.startswith(b"BIRD"), needs="patience")
+def read_diary(path, options, findings):
+    \"""Time and place, a row each.\"""
+    t, x, y = np.loadtxt(path, skiprows=1).T
+    return [ImportedTrack("robin", str(path), t, {"x": x, "y": y}, np.arange(len(t)))]
+"""
+
+
+@pytest.fixture(params=["beside", "package"])
+def diary(request, tmp_path, monkeypatch):
+    """A file of a format that one file reads, which lies beside the others or in an installed package."""
+    folder = tmp_path / "site"
+    if request.param == "beside":
+        folder.mkdir()
+        monkeypatch.setattr(imports, "__path__", [*imports.__path__, str(folder)])
+        monkeypatch.setattr(imports.__spec__, "submodule_search_locations", imports.__path__)
+        file, module = folder / "diary.py", "airflock.recordings.imports.diary"
+    else:
+        (folder / "aviary" / "readers").mkdir(parents=True)
+        for package in ("aviary", "aviary/readers"):
+            (folder / package / "__init__.py").touch()
+        (folder / "aviary-1.0.dist-info").mkdir()
+        (folder / "aviary-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: aviary\nVersion: 1.0\n")
+        (folder / "aviary-1.0.dist-info" / "entry_points.txt").write_text("[airflock.parts]\naviary = aviary\n")
+        monkeypatch.syspath_prepend(folder)
+        file, module = folder / "aviary" / "readers" / "diary.py", "aviary.readers.diary"
+    file.write_text(READER)
+    yield file
+    for name in (module, "aviary", "aviary.readers"):
+        sys.modules.pop(name, None)
+
+
+def test_a_reader_in_one_file_works_at_once(diary, tmp_path, monkeypatch):
+    truth = Truth(np.random.default_rng(3), count=1)
+    rows = np.column_stack([truth.t, truth.place[:, 0]])
+    for name in ("a.bird", "a.dat"):  # the second by its first bytes
+        np.savetxt(tmp_path / name, rows, header="BIRD", comments="")
+        found = airflock.load_tracks(tmp_path / name, precision=64)
+        truth.check(found, names=["robin"])
+    assert ".bird (diary of a bird)" in refusal(write(tmp_path / "a.xlsx", "no table"))
+    assert "is no diary of a bird" in refusal(write(tmp_path / "b.bird", "t x y"))
+    with pytest.raises(RecordingError, match="holds tracks, not a recording"):
+        airflock.load_recording(tmp_path / "a.bird")
+    help = CliRunner().invoke(app, ["import", "--help"], env={"COLUMNS": "400"}).output
+    assert ".bird (diary of a bird)" in help and ".ulg (PX4 ULog)" in help
+    monkeypatch.setattr(writing, "OUT", tmp_path)
+    kinds.formats()
+    row = "| `.bird` | diary of a bird | Time and place, a row each. | patience |"
+    assert row in (tmp_path / "formats.md").read_text()
+
+
+def test_a_reader_that_cannot_be_read_is_left_out_with_its_name(diary, tmp_path):
+    if diary.parent.name == "readers":
+        diary.write_text("\n@reader(\n")
+        with pytest.warns(UserWarning, match=r"aviary: aviary\.readers: .*diary\.py.* its readers are left out"):
+            known = imports.formats()
+        assert "PX4 ULog" in {one.name for one in known}
+
+
+def test_every_format_says_what_is_read_and_no_two_share_an_ending_without_a_sniffer():
+    endings = [ending for one in imports.formats() for ending in one.suffixes if one.load().sniff is None]
+    assert len(endings) == len(set(endings)) and {".csv", ".ulg", ".nc", ".npy"} <= set(endings)
+    assert all(one.about.endswith((".", "which")) for one in imports.formats())

@@ -126,6 +126,47 @@ def test_outliers_are_left_out_and_no_sound_row_with_them(rng):
     assert np.linalg.norm(places(recording)[0] - truth(table)[0], axis=1).max() < 3.0 * step
 
 
+def test_identities_exchanged_at_a_few_centimetres_are_told_by_the_noise_alone(rng):
+    """Neighbours in a school move farther in a frame or two than they are apart: their own motion hides no exchange."""
+    rate, rows, noise = rng.choice([25.0, 50.0]), int(rng.integers(80, 240)), rng.uniform(0.0, 0.001)
+    apart, speed = rng.uniform(0.03, 0.06), rng.uniform(0.05, 0.6)
+    shared = wander(rng, rows, 1.0 / rate, speed, 0.0)
+    pair = np.stack([shared, shared + [apart, 0.0]]) + rng.normal(0.0, noise, (2, rows, 2))
+    at = int(rng.integers(10, rows - 10))
+    exchanged = np.concatenate([pair[:, :at], pair[::-1, at:]], axis=1)
+    table = pd.DataFrame({
+        "t": np.tile(np.arange(rows) / rate, 2), "id": np.repeat(["a", "b"], rows),
+        "x": exchanged[..., 0].ravel(), "y": exchanged[..., 1].ravel(),
+    })  # fmt: skip
+    sound = table.assign(x=pair[..., 0].ravel(), y=pair[..., 1].ravel())
+    assert np.array_equal(places(airflock.load_tracks(sound, unit="m", precision=64)), pair)
+    with pytest.raises(RecordingError) as error:
+        airflock.load_tracks(table, unit="m")
+    lines = str(error.value).splitlines()
+    assert len(lines) == 2 and all("identities exchanged" in line for line in lines)
+    recording = airflock.load_tracks(table, unit="m", accept="jumps", precision=64)
+    speeds = np.linalg.norm(recording["velocity"].values, axis=1)
+    most = np.linalg.norm(np.diff(pair, axis=1), axis=2).max() * rate
+    assert np.nanmax(speeds) <= 1.001 * most
+
+
+def test_a_bad_row_at_an_end_of_a_track_is_no_reset(rng):
+    table, period = school(rng, 1, rng.uniform(0.5, 5.0))
+    rows, row = len(table), rng.choice([0, len(table) - 1])
+    step = np.linalg.norm(np.diff(table[["x", "y"]].to_numpy(), axis=0), axis=1).max()
+    spoilt, angle = table.copy(), rng.uniform(0.0, 2.0 * np.pi)
+    # farther than an animal starts in a frame, which would be motion
+    size = max(rng.uniform(50.0, 300.0) * step, 300.0 * (3.0 * period) ** 2)
+    spoilt.loc[row, ["x", "y"]] += size * np.array([np.cos(angle), np.sin(angle)])
+    gone = [row]
+    if rng.random() < 0.3:  # and a gap beside it
+        gap = [1, 2] if row == 0 else [rows - 3, rows - 2]
+        gone, spoilt = [*gone, *gap], spoilt.drop(index=gap)
+    recording = airflock.load_tracks(spoilt, unit="m", precision=64)
+    assert any("1 outliers left out" in note for note in notes(recording))
+    np.testing.assert_array_equal(places(recording)[0], np.delete(truth(table)[0], gone, axis=0))
+
+
 def test_an_absent_animal_that_is_parked_is_absent(rng):
     table, period = school(rng, 2, rng.uniform(0.5, 5.0))
     table[["x", "y"]] += rng.choice([-1, 1], 2) * rng.uniform(10.0, 20.0, 2)
@@ -177,6 +218,8 @@ FLAGS = {  # column → what it holds where a row counts, and where it does not
     "import-marked-outlier": ([None, "false"], ["true"]),
     "likelihood": ([0.61, 0.99, 1.0], [0.0, 0.3, 0.59]),
     "confidence": ([0.9], [0.1]),
+    "confidence [%]": ([61, 90, 100], [0, 20, 59]),
+    "score": ([70.0, 95.5], [3.0, 41.0]),
     "status": (["A"], ["V"]),
 }
 

@@ -373,10 +373,8 @@ def test_a_unit_of_time_that_is_wrong_is_told_without_a_velocity(tmp_path):
     assert airflock.load_tracks(path, map={"t": "'t [ms]'*1e-06"}).attrs["fps"] == RATE
     slow = own.assign(t=own["t"] * 1e6 / RATE)
     assert "if times are no seconds, for instance --time-unit ms or us" in refused(slow)
-    assert (
-        "if it does not count seconds, write for instance --time-unit ms or us"
-        in (airflock.load_tracks(slow, unit="m").attrs["airflock_import"])
-    )
+    assert "ms? Write --time-unit ms; if they are seconds, --time-unit s" in refused(slow, unit="m")
+    assert airflock.load_tracks(slow, unit="m", time_unit="s").attrs["fps"] == pytest.approx(1e-6 * RATE**2, rel=1e-3)
     dates = own.assign(t=1.7e12 + own["t"] * 1e6).rename(columns={"t": "t [ms]"})  # a fix a minute, since 1970
     assert airflock.load_tracks(dates).sizes["time"] == len(own)
 

@@ -81,7 +81,7 @@ def test_a_row_of_units_and_a_time_that_is_none_say_what_to_write(tmp_path):
     np.testing.assert_allclose(found["position"].values[:, 0, 0, 0], TIMES)
     assert "row 2 holds the units of the columns" in found.attrs["airflock_import"]
     assert "'mm' is a unit; write it into the header" in refused(tmp_path, "t,x,y\n0,1,2\n,mm,mm\n")
-    line = refused(tmp_path, "t,x,y\n04.05.2026 10:00,1,2\n")
+    line = refused(tmp_path, "t,x,y\nMay 4th 2026,1,2\n")
     assert "is no time; write seconds, hours:minutes:seconds, or dates" in line
 
 

@@ -160,12 +160,24 @@ VALUE_ERROR_NAMES = ("BadParameter", "MissingParameter")  # errors of one option
 NUMBER_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")  # kinds of options
 
 
+FORMATS = "the formats that airflock import --help lists"  # in a help text, which is printed with their names
+
+
 class VerbCommand(TyperCommand):
     """Command that checks its options one by one; nan and inf are refused where an option has a range.
 
     A verb that takes its context goes on with numbers that are `WRONG`, and refuses them with all else that it finds
     wrong (`options.collect_option_errors`); any other ends before it begins.
     """
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help, with the formats of files that can be read now."""
+        for parameter in self.params:
+            if FORMATS in (getattr(parameter, "help", None) or ""):
+                from airflock.recordings import format_words
+
+                parameter.help = parameter.help.replace(FORMATS, format_words())  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of a command line."""

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, terminal
+from airflock.cli.command import FORMATS
 from airflock.cli.terminal import counting_parts, progress_line
 from airflock.support import PICTURES, RECORDINGS, SCENARIOS, AirflockError, RecordingError, collect_errors
 
@@ -16,8 +17,7 @@ Files = Annotated[
     list[Path],
     typer.Argument(
         metavar="FILE...", show_default=False,
-        help=".csv, .parquet, .ulg (PX4), .bin and .tlog (ArduPilot), .log (our nodes), .nc and .h5 (movement, "
-        "idtracker.ai, SLEAP), .npy, .npz, .mat",
+        help=f"One or several of {FORMATS}.",
     ),
 ]  # fmt: skip
 Map = Annotated[
@@ -27,7 +27,10 @@ Map = Annotated[
 Unit = Annotated[str, typer.Option(metavar="UNIT", help="Unit of lengths that have none: m, cm, mm, km, ft, px.")]
 Scale = Annotated[float | None, typer.Option(help="Metres per pixel.", show_default=False)]
 TimeUnit = Annotated[
-    str, typer.Option(metavar="UNIT", help="Unit of times that have none: s, ms, us, ns, min, frames.")
+    str,
+    typer.Option(
+        metavar="UNIT", help="Unit of times that have none: s, ms, us, ns, min, frames; order of dates: dmy, mdy."
+    ),
 ]
 Fps = Annotated[float | None, typer.Option(help="Frames per second, if the file counts frames.", show_default=False)]
 Axes = Annotated[

@@ -24,6 +24,10 @@ from .flown_scenario import (
     scenario_of_recording as scenario_of_recording,
 )
 from .health import doctor as doctor
+from .imports import (
+    format_words as format_words,
+    formats as formats,
+)
 from .imports.load_tracks import (
     load_tracks as load_tracks,
     read_tracks as read_tracks,

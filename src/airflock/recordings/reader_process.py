@@ -24,6 +24,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from airflock.recordings.imports import formats
 from airflock.support import RecordingError, as_error, is_file, to_path
 
 # Archives, compressed files and pickles are no recordings, whatever their names say; one line names
@@ -60,18 +61,6 @@ WAIT = 4.0  # time by the clock over that of a processor, for machines that are 
 MOST_HEADER = 200_000_000  # bytes of names and attributes
 SPARE = 4 * 2**30  # bytes of address space besides the arrays: libraries, buffers
 RECORDING = "a netCDF recording"
-FOREIGN = (
-    ".csv",
-    ".tsv",
-    ".parquet",
-    ".ulg",
-    ".bin",
-    ".tlog",
-    ".npy",
-    ".npz",
-    ".h5",
-    ".mat",
-)  # what airflock import reads
 ENDED_LATE = tuple(-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name))
 START = """import json, sys
 request = json.loads(sys.stdin.readline())
@@ -136,7 +125,8 @@ class ReaderProcess:
         self.path, self.kind, self.decoded = to_path(path), kind, read is read_netcdf_arrays
         if not is_file(self.path):
             raise RecordingError(f"{self.path}: no such file")
-        if kind == RECORDING and self.path.suffix.lower() in FOREIGN:
+        ending = self.path.suffix.lower()
+        if kind == RECORDING and ending != ".nc" and any(ending in one.suffixes for one in formats()):
             raise RecordingError(
                 f"{self.path}: holds tracks, not a recording: airflock import {self.path.name} --save FILE.nc"
             )

@@ -1,1 +1,97 @@
-"""Tracks of others: one reader per format, one set of checks, one time grid, and the door `load_tracks`."""
+"""Tracks of others: one reader per format, one set of checks, one time grid, and the door `load_tracks`.
+
+A reader is a function in a file of this folder, or of the folder `readers` of an installed package that declares the
+entry point `airflock.parts`. Its decorator declares which files it reads, and no list names it:
+
+    @reader("my log", suffixes=(".mylog",), sniff=lambda start: start.startswith(b"MYLOG"))
+    def read_my_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+        '''Time and place of each bird.'''
+"""
+
+import ast
+import warnings
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from inspect import cleandoc
+from pathlib import Path
+from typing import Any, NamedTuple
+
+SNIFFED = 4096  # bytes of a file that a sniffer gets
+
+
+class Format(NamedTuple):
+    """A format of files, as the decorator of its reader declares it.
+
+    about : first paragraph of the reader's docstring; needs : packages beside those of Airflock
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    needs: str
+    about: str
+    module: str
+    function: str
+
+    def load(self) -> Callable[..., Any]:
+        """Import the reader."""
+        read: Callable[..., Any] = getattr(import_module(self.module), self.function)
+        return read
+
+
+def reader(
+    name: str, *, suffixes: tuple[str, ...], sniff: Callable[[bytes], bool] | None = None, needs: str = ""
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Declare a reader of files; all but `sniff` is written literally, since it is read without running the file.
+
+    name     : of the format; suffixes : endings of its files, in small letters
+    sniff    : returns True for the first bytes of a file of this format: it then reads files of any ending
+    needs    : packages beside those of Airflock, with their licences
+    """
+
+    def declare(read: Callable[..., Any]) -> Callable[..., Any]:
+        read.sniff = sniff  # type: ignore[attr-defined]
+        return read
+
+    return declare
+
+
+def formats() -> list[Format]:
+    """Return the formats that can be read: ours, then those of installed packages.
+
+    They are read from the text of the files: help names them without importing NumPy.
+    """
+    found = list(_declared("airflock", __name__))
+    for point in entry_points(group="airflock.parts"):
+        owner = point.dist.name if point.dist else point.name
+        try:
+            found += _declared(owner, f"{point.value}.readers")
+        except Exception as error:  # a package of somebody else may fail in any way, and ours must go on
+            warnings.warn(f"{owner}: {point.value}.readers: {error}; its readers are left out", stacklevel=2)
+    return found
+
+
+def _declared(owner: str, package: str) -> Iterator[Format]:
+    """Yield the formats that the files of a package declare; none where there is no such package."""
+    try:
+        spec = find_spec(package)
+    except ModuleNotFoundError:
+        return
+    folders = spec.submodule_search_locations or () if spec else ()
+    for path in sorted(path for folder in folders for path in Path(folder).glob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.parse(text, str(path)).body if "\n@reader(" in text else ():
+            for call in node.decorator_list if isinstance(node, ast.FunctionDef) else ():
+                if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "reader":
+                    own = {key.arg: ast.literal_eval(key.value) for key in call.keywords if key.arg != "sniff"}
+                    about = cleandoc(ast.get_docstring(node) or "").split("\n\n")[0].replace("\n", " ")
+                    name = ast.literal_eval(call.args[0])
+                    yield Format(
+                        name, own["suffixes"], own.get("needs", ""), about, f"{package}.{path.stem}", node.name
+                    )
+
+
+def format_words() -> str:
+    """Return endings and names of all formats, for help and errors: `.ulg (PX4 ULog), ...`."""
+    return ", ".join(f"{', '.join(one.suffixes)} ({one.name})" for one in formats())

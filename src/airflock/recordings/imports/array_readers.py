@@ -2,6 +2,7 @@
 
 import math
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.imports import table_columns
+from airflock.recordings.imports import reader, table_columns
 from airflock.recordings.imports.read_tables import choose_keypoint, read_frame
 from airflock.recordings.imports.track import (
     COMMAND_TARGETS,
@@ -22,7 +23,7 @@ from airflock.recordings.imports.track import (
 from airflock.recordings.reader_process import ReaderProcess, read_hdf5_arrays, read_mat_arrays, read_netcdf_arrays
 from airflock.support import RecordingError, collect_errors
 
-# NumPy arrays are never unpickled: a pickle runs code when it is read.
+PICKLED = "holds pickled Python objects, which could run code when read; "
 PLAIN = "idtrackerai_format SESSION --formats h5 writes plain numbers; or, if you trust the file, python -c "
 COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pickle=True).item()['trajectories'])\""
 
@@ -54,6 +55,12 @@ def read_array(
             "python -c \"import numpy as np; np.save('frames.npy', ARRAY.swapaxes(0, 1))\"",
             "axes",
         )
+    if values.shape[2] == 3 and _is_heading(values.astype(float)):
+        findings.add_error(
+            f"{where}: the third number of each place, row 1 on, goes as headings do, and would be read as a height: "
+            "python -c \"import numpy as np; np.save('places.npy', ARRAY[..., :2])\"",
+            "axes",
+        )
     findings.raise_errors()
     rate, scale = options.use("fps") or fps, math.nan
     options.used.update({"time_unit"} if options.time_unit == "frames" else ())
@@ -70,6 +77,30 @@ def read_array(
         name = names[number] if names else str(number + 1)
         found.append(ImportedTrack(name, where, frames / rate, columns, frames))
     return found
+
+
+def _is_heading(values: Any) -> bool:
+    """Return True if the third number of places (frame, individual, 3) is the direction of motion in the plane.
+
+    It is, in radians or degrees, from any axis and turning either way, if course and angle stay together while they
+    change. An angle that nobody moves by, as of an animal that waits, jumps by a whole turn now and then.
+    """
+    moved, third = np.diff(values[..., :2], axis=0), values[:-1, :, 2]
+    far = np.linalg.norm(moved, axis=2)
+    there = np.isfinite(far + third) & (far > 0.0)
+    if there.sum() < 10:
+        return False
+    course = np.arctan2(moved[there][:, 1], moved[there][:, 0])
+    steps = np.abs(np.diff(values[..., 2], axis=0))
+    for turn in (2.0 * np.pi, 360.0):
+        angle = third[there] * (2.0 * np.pi / turn)
+        together = max(abs(np.exp(1j * (angle - course)).mean()), abs(np.exp(1j * (angle + course)).mean()))
+        vary = max(abs(np.exp(1j * angle).mean()), abs(np.exp(1j * course).mean())) < 0.95
+        within = np.ptp(third[there]) <= 1.001 * turn
+        wraps = within and (steps > 0.9 * turn).any() and np.nanmedian(steps) < 0.1 * turn
+        if (together > 0.95 and vary) or wraps:
+            return True
+    return False
 
 
 def _step(values: Any, axis: int) -> float:
@@ -102,40 +133,33 @@ def _numbers(array: Any, where: str) -> Any:
     return values if hidden is None else np.where(hidden, np.nan, values)
 
 
+@reader("arrays of NumPy", suffixes=(".npy", ".npz"))
 def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read tracks of a .npy or .npz file of plain numbers."""
-    refuse_pickled_arrays(path)
-    with path.open("rb") as file:
-        start = file.read(6)
-    if start != b"\x93NUMPY" and start[:2] != b"PK":
-        raise RecordingError(f"{path}: is not an array that NumPy wrote")
+    """(frame, individual, 2 or 3), with `--fps` and `--unit`. Of several arrays that of `positions, position,
+    trajectories, pos, xyz, xy, tracks` is read, or `x` and `y` together; a note says which. Otherwise write
+    `--map position:=NAME`.
+    """
     try:
-        with open(path, "rb") as file:
+        with path.open("rb") as file:
             loaded = np.load(file, allow_pickle=False)
-            if isinstance(loaded, np.lib.npyio.NpzFile):
-                if not loaded.files:
-                    raise RecordingError(f"{path}: is an archive without an array")
-                members = {name: _member(loaded, name) for name in loaded.files}
-                strange = [name for name, member in members.items() if isinstance(member, bytes)]
-                if strange:
-                    raise RecordingError(f"{path}: is an archive of {strange[0]}, which is no array; unpack it first")
-                return read_members(members, path, options, findings)
+            if not isinstance(loaded, np.lib.npyio.NpzFile):
+                return read_array(loaded, options, str(path), findings=findings)
+            needed = [name for name in loaded.files if name.lower() in POSITION_MEMBERS or len(loaded.files) == 1]
+            members = {}
+            for name in loaded.files:
+                # Pickled objects that nobody needs are in nobody's way.
+                with suppress(*() if name in needed else (ValueError,)):
+                    members[name] = loaded[name]
     except (ValueError, OSError, EOFError) as error:
         text = str(error).splitlines()[0]
-        if "allow_pickle" in text or "pickle" in text.lower():
-            raise RecordingError(_pickled(path)) from error
+        if "pickle" in text.lower():
+            # NumPy arrays are never unpickled: a pickle runs code when it is read.
+            raise RecordingError(f"{path}: {PICKLED}{PLAIN}{COMMAND}".replace("FILE", path.name)) from error
         raise RecordingError(f"{path}: is not an array of numbers: {text}") from error
-    return read_array(loaded, options, str(path), findings=findings)
-
-
-def _member(archive: Any, name: str) -> Any:
-    """Return an array of an archive; an empty one in the place of pickled objects that nobody needs."""
-    try:
-        return archive[name]
-    except ValueError:
-        if name.lower() in POSITION_MEMBERS or len(archive.files) == 1:
-            raise
-        return np.empty((0, 0))
+    strange = [name for name, member in members.items() if isinstance(member, bytes)]
+    if strange:
+        raise RecordingError(f"{path}: is an archive of {strange[0]}, which is no array; unpack it first")
+    return read_members(members, path, options, findings)
 
 
 # What a member of a file of several arrays is called if it holds positions, the likeliest first.
@@ -173,28 +197,15 @@ def read_members(
     return read_array(arrays[chosen], options, str(path), findings=findings)
 
 
+@reader("arrays of MATLAB", suffixes=(".mat",))
 def read_mat(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read tracks of a file of MATLAB: of its own format, or HDF5 since 7.3, whose axes are the other way round."""
+    """As those of NumPy; also in the format since 7.3, which is HDF5 and has the axes the other way round."""
     with path.open("rb") as file:
         new = b"MATLAB 7.3" in file.read(128)
     read = read_hdf5_arrays if new else read_mat_arrays
     plain = ReaderProcess(path, read, "a file of MATLAB").answer()
     arrays = {str(name): variable.values for name, variable in plain.variables.items()}
     return read_members({name: a.T if new else a for name, a in arrays.items()}, path, options, findings)
-
-
-def refuse_pickled_arrays(path: Path) -> None:
-    """Raise a RecordingError for a file of pickled objects."""
-    with path.open("rb") as file:
-        start = file.read(2)
-    if start[:1] == b"\x80" and start[1:2] in b"\x02\x03\x04\x05":
-        raise RecordingError(_pickled(path))
-
-
-def _pickled(path: Path) -> str:
-    return f"{path}: holds pickled Python objects, which could run code when read; {PLAIN}{COMMAND}".replace(
-        "FILE", path.name
-    )
 
 
 def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
@@ -242,12 +253,22 @@ def _read_sleap(file: xr.Dataset, path: Path, options: ImportOptions) -> list[Im
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 
 
+@reader("HDF5 of movement, idtracker.ai or SLEAP", suffixes=(".h5", ".hdf5"))
+def read_hdf5(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """`trajectories` of idtracker.ai with its frame rate, `tracks` of an analysis file of SLEAP by `--keypoint`,
+    datasets of `movement`; other arrays as those of NumPy.
+    """
+    plain = ReaderProcess(path, read_hdf5_arrays, "a HDF5 file").answer()
+    if "position" in plain:
+        return read_netcdf(path, options, findings)
+    return read_idtracker(plain, path, options, findings)
+
+
+@reader("netCDF of movement", suffixes=(".nc",))
 def read_netcdf(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
-    if path.suffix.lower() in (".h5", ".hdf5"):
-        plain = ReaderProcess(path, read_hdf5_arrays, "a HDF5 file").answer()
-        if "position" not in plain:
-            return read_idtracker(plain, path, options, findings)
+    """`position` by current names of dimensions and those up to 0.16, poses and boxes; `--keypoint` picks one
+    keypoint. An xarray Dataset is read in the same way.
+    """
     return read_dataset(ReaderProcess(path, read_netcdf_arrays, "a netCDF file").answer(), options, str(path))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.drones import AIRBORNE_PHASES, FLYING_PHASES, read_log_ticks
+from airflock.recordings.imports import reader
 from airflock.recordings.imports.common_frame import on_other_clock
 from airflock.recordings.imports.table_columns import invalid_note, px4_origin
 from airflock.recordings.imports.track import (
@@ -23,24 +24,30 @@ from airflock.recordings.imports.track import (
 from airflock.recordings.reader_process import Contents, OnShare, ReaderProcess
 from airflock.support import LinkError, RecordingError
 
-# PX4 ULog files, by pyulog (BSD-3, an extra): topics by name, north-east-down to east-north-up,
-# resets and clock of the file.
+LOGS = "pip install 'airflock[logs]'"
 LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
 TOPICS = [LOCAL, SETPOINT, "vehicle_gps_position", "vehicle_land_detected"]
 NED = (("x", "y", "z"), ("vx", "vy", "vz"))
 
 
-def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
+def _track(name: str, path: Path, time: Any, columns: dict[str, Any], rows: Any, **more: Any) -> ImportedTrack:
+    """Make a track of an autopilot: its axes are those of the ground, and its units are fixed."""
+    how = {"clock": "boot", "datum": "amsl", "fixed_units": True, "ground": True}
+    return ImportedTrack(name, str(path), time, columns, rows, **{**how, **more})
 
-    The set-point is the request of the companion; vehicle_local_position_setpoint is the
-    controller's own output and is not read. Rows where the estimator calls its position invalid are
-    left out.
+
+@reader("PX4 ULog", suffixes=(".ulg",), needs="pyulog (BSD-3)")
+def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """`vehicle_local_position`; the command is `trajectory_setpoint.velocity` (both generations of its fields); clock
+    from `vehicle_gps_position`; in the air from `vehicle_land_detected`; split where `xy_reset_counter` changes.
+
+    The set-point is the request of the companion; vehicle_local_position_setpoint is the controller's own output and is
+    not read. Rows where the estimator calls its position invalid are left out.
     """
     try:
         from pyulog import ULog
     except ImportError as error:
-        raise RecordingError(f"{path}: PX4 logs need pyulog: pip install 'airflock[logs]'") from error
+        raise RecordingError(f"{path}: PX4 logs need pyulog: {LOGS}") from error
     try:
         log = ULog(str(path), TOPICS)
     except Exception as error:  # pyulog raises TypeError, struct.error, IndexError and others for damaged files
@@ -58,7 +65,7 @@ def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
     for flag in ("xy_valid", "v_xy_valid"):
         valid &= local[flag].astype(bool) if flag in local else True
     labels = {"x": "y", "y": "x", "z": "-z", "vx": "vy", "vy": "vx", "vz": "-vz"}
-    found = ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels, "boot", datum="amsl")
+    found = _track(path.stem, path, time, columns, np.arange(len(time)), user_labels=labels)
     _add_commands(found, *_setpoints(topics.get(SETPOINT)), findings, f"{SETPOINT} (velocities)")
     if "xy_reset_counter" in local:
         found.breaks = np.flatnonzero(np.diff(local["xy_reset_counter"].astype(np.int64)) != 0) + 1
@@ -119,30 +126,27 @@ GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970
 LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so that it cannot part them
 
 
+@reader(
+    "DataFlash log of ArduPilot", suffixes=(".bin",), sniff=lambda start: start.startswith(HEAD),
+    needs="pymavlink (LGPL-3, imported only to read such a log)",
+)  # fmt: skip
 def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read a DataFlash log: PSCN, PSCE, PSCD (position, velocity), GUIP (commanded velocity), ORGN and GPS.
+    """`PSCN, PSCE, PSCD` by field names (position, velocity), `ORGN`, `GPS`. The command is `GUIP` in its own unit, the
+    velocity that GUIDED mode was sent. Of planes, rovers and older releases `XKF1`, else `NKF1`, `POS` or `GPS`,
+    without commands; a note says which.
 
-    TVN, TVE, TVD are no commands: they are what the position controller makes of GUIP within its
-    limits of acceleration and jerk, so that a response to them looks eight times as quick as that
-    to a command.
+    TVN, TVE, TVD are no commands: they are what the position controller makes of GUIP within its limits of acceleration
+    and jerk, so that a response to them looks eight times as quick as that to a command.
     """
     _need_pymavlink(path)
-    with path.open("rb") as file:
-        if file.read(len(HEAD)) != HEAD:
-            raise RecordingError(f"{path}: is no DataFlash log of ArduPilot: it does not begin with its mark, A3 95")
     contents = ReaderProcess(path, read_dataflash_arrays, "a DataFlash log", pace=PACE).answer(options.done)
     rows = {part: contents[part].values for part in PARTS if part in contents}
     if "PSCN" not in rows or "PSCE" not in rows:
         return [_estimated(path, findings)]
     found = _joined(rows, path)
-    found.clock, found.datum = "boot", "amsl"
     guided = contents["GUIP"].values if "GUIP" in contents else np.empty((0, 6))
     _add_commands(found, guided[:, 2] * 1e-6, _guided_velocities(guided), findings, "GUIP (velocities in GUIDED mode)")
-    if "ORGN" in contents:
-        latitude, longitude, height = (float(value) for value in contents["ORGN"].values[-1])
-        found.origin = (latitude, longitude, height)
-    found.utc = _gps_times(contents["GPS"].values) if "GPS" in contents else None
-    return [found]
+    return [_located(found, contents)]
 
 
 LOCAL_FIELDS = {"y": "PN", "x": "PE", "z": "PD", "vy": "VN", "vx": "VE", "vz": "VD"}
@@ -151,6 +155,23 @@ GEODETIC_FIELDS = {"lat": "Lat", "lon": "Lng", "alt": "Alt"}
 # of the filter or the receiver.
 ESTIMATES = {"XKF1": ("C", LOCAL_FIELDS), "NKF1": ("C", LOCAL_FIELDS), "POS": ("I", GEODETIC_FIELDS),
              "GPS": ("I", GEODETIC_FIELDS)}  # fmt: skip
+
+
+def _located(track: ImportedTrack, contents: Any) -> ImportedTrack:
+    """Add the origin of the local frame, and times of satellites, as far as a log has them."""
+    if "ORGN" in contents:
+        track.origin = _place(contents["ORGN"].values[-1])
+    # Times since the start and since 1970 by the first receiver.
+    table = contents["GPS"].values if "GPS" in contents else np.empty((0, 4))
+    known = table[(table[:, -2] > 0.0) & (table[:, 1] == 0.0)]
+    utc = GPS_EPOCH - LEAP_SECONDS + known[:, -2] * 604800.0 + known[:, -1] * 1e-3
+    track.utc = np.stack([known[:, 0] * 1e-6, utc], axis=1) if len(known) >= 2 else None
+    return track
+
+
+def _place(row: Any) -> tuple[float, float, float]:
+    latitude, longitude, height = (float(value) for value in row)
+    return latitude, longitude, height
 
 
 def _estimated(path: Path, findings: ImportReport) -> ImportedTrack:
@@ -170,20 +191,8 @@ def _estimated(path: Path, findings: ImportReport) -> ImportedTrack:
     table = table[numbers == numbers.min()]  # the first of several filters or receivers
     columns = {name: (-1.0 if name in ("z", "vz") else 1.0) * table[:, 2 + c] for c, name in enumerate(fields)}
     labels = {name: f"{kind}.{field}" for name, field in fields.items()}
-    found = ImportedTrack(path.stem, str(path), table[:, 0] * 1e-6, columns, np.arange(len(table)), labels, "boot")
-    found.datum = "amsl"
-    found.utc = _gps_times(contents["GPS"].values[:, [0, 5, 6, 1]]) if "GPS" in contents else None
-    if "ORGN" in contents:
-        latitude, longitude, height = (float(value) for value in contents["ORGN"].values[-1])
-        found.origin = (latitude, longitude, height)
-    return found
-
-
-def _gps_times(table: Any) -> Any:
-    """Return times since the start and since 1970 (row, 2), s, by the first receiver; None below two."""
-    known = table[(table[:, 1] > 0.0) & (table[:, 3] == 0.0)]
-    utc = GPS_EPOCH - LEAP_SECONDS + known[:, 1] * 604800.0 + known[:, 2] * 1e-3
-    return np.stack([known[:, 0] * 1e-6, utc], axis=1) if len(known) >= 2 else None
+    found = _track(path.stem, path, table[:, 0] * 1e-6, columns, np.arange(len(table)), user_labels=labels)
+    return _located(found, contents)
 
 
 def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
@@ -201,7 +210,7 @@ def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
         k: columns[k] for k in (*POSITION_TARGETS, *VELOCITY_TARGETS) if k in columns and np.isfinite(columns[k]).any()
     }
     labels = {"x": "PSCE.PE", "y": "PSCN.PN", "z": "-PSCD.PD", "vx": "PSCE.VE", "vy": "PSCN.VN", "vz": "-PSCD.VD"}
-    return ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels)
+    return _track(path.stem, path, time, columns, np.arange(len(time)), user_labels=labels)
 
 
 def _guided_velocities(guided: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -233,11 +242,12 @@ def _add_commands(track: ImportedTrack, at: Any, commands: Any, findings: Import
         track.columns |= dict(zip(COMMAND_TARGETS, held.T, strict=True))
 
 
+@reader("telemetry log of MAVLink", suffixes=(".tlog",), needs="pymavlink")
 def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
+    """`LOCAL_POSITION_NED` of each vehicle, velocities of `POSITION_TARGET_LOCAL_NED` as its command; rows have the
+    vehicle's own time, put on the receiver's clock.
 
-    All vehicles share the receiver's clock; a row is put on it by the vehicle's own time,
-    `time_boot_ms`, not by its arrival. Positions are about their own origins.
+    A row is put on that clock by `time_boot_ms`, not by its arrival. Positions are about their own origins.
     """
     _need_pymavlink(path)
     contents = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
@@ -256,13 +266,12 @@ def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
         time = np.empty(len(both))
         time[order] = state_times(*both[order].T)
         columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), table.T[2:].copy(), strict=True))
-        track = ImportedTrack(f"vehicle_{who}", str(path), time[: len(rows)], columns, rows, {}, "utc", datum="amsl")
+        track = _track(f"vehicle_{who}", path, time[: len(rows)], columns, rows, clock="utc")
         track.breaks = np.flatnonzero(np.diff(table[:, 1]) < -REBOOT) + 1
         velocity = np.where((ask[:, 5].astype(int) & VELOCITY_IGNORED == 0)[:, None], ask[:, 2:5], np.nan)
         _add_commands(track, time[len(rows) :], velocity, findings, "POSITION_TARGET_LOCAL_NED (velocities)")
         if who in origins:
-            latitude, longitude, height = (float(value) for value in origins[who][-1])
-            track.origin = (latitude, longitude, height)
+            track.origin = _place(origins[who][-1])
         found.append(track)
     return found
 
@@ -299,7 +308,7 @@ def read_dataflash_arrays(path: str, _: int, share: OnShare) -> Contents:
     from pymavlink import DFReader
 
     fields: dict[str, tuple[str, ...]] = {part: ("TimeUS", f"P{part[-1]}", f"V{part[-1]}") for part in PARTS}
-    fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": ("TimeUS", "GWk", "GMS", "I")}
+    fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": ("TimeUS", "I", "GWk", "GMS")}
     fields |= {"GUIP": ("Type", "TimeUS", "vX", "vY", "vZ")}
 
     def source(message: Any) -> list[float]:
@@ -357,26 +366,25 @@ def _tables(
 
 def _need_pymavlink(path: Path) -> None:
     if find_spec("pymavlink") is None:
-        raise RecordingError(f"{path}: ArduPilot logs need pymavlink (LGPL-3): pip install 'airflock[logs]'")
+        raise RecordingError(f"{path}: ArduPilot logs need pymavlink (LGPL-3): {LOGS}")
 
 
-# Logs that nodes write on board: place and velocity from the autopilot, and the commands of the
-# node.
 RECKONED_SPEED = 0.5  # m/s; slower, a step says nothing of the time
 CLOCK_GAIN = 0.05  # share of the difference to the ticks that each row takes back: over a second at 20 Hz
-OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs end in .log, too
 
 
+@reader(
+    "log of a node of Airflock; of ArduPilot give the .bin that it was made from", suffixes=(".log",),
+    sniff=lambda start: start.startswith(b'{"log":'), needs="pymavlink",
+)  # fmt: skip
 def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read the log of a node on board: local east-north-up of its mission, by the clock of its computer.
+    """Place and velocity as the autopilot sent them, at its own time put on the node's clock, and what the node
+    commanded, in east-north-up of the mission. Without the autopilot's bytes the time is reckoned from the steps.
 
-    A row is a tick at which the own state was another than at the tick before, at the time at which
-    the state held, not that of the tick. Commands are those of phases in which the node flies; the
-    log's first line relates their clock to UTC.
+    A row is a tick at which the own state was another than at the tick before, at the time at which the state held, not
+    that of the tick. Commands are those of phases in which the node flies; the log's first line relates their clock to
+    UTC.
     """
-    with open(path, "rb") as file:
-        if not file.read(8).startswith(b'{"log":'):
-            raise RecordingError(f"{path}: .log: unknown format; {OTHERS}")
     try:
         log = read_log_ticks(path)
     except LinkError as error:
@@ -399,16 +407,8 @@ def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) ->
     columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), place.T, strict=True))
     labels = {name: f"own[{c}]" for c, name in enumerate((*POSITION_TARGETS, *VELOCITY_TARGETS))}
     labels |= {name: f"set[{c}]" for c, name in enumerate(COMMAND_TARGETS)}
-    found = ImportedTrack(
-        f"member_{log.member}",
-        str(path),
-        time,
-        columns,
-        np.array([tick.line for tick in ticks]),
-        labels,
-        "boot",
-        datum="home",
-    )
+    lines = np.array([tick.line for tick in ticks])
+    found = _track(f"member_{log.member}", path, time, columns, lines, user_labels=labels, datum="home")
     flown = np.array([tick.phase in FLYING_PHASES for tick in log.ticks])
     if flown.any():
         commands = np.where(flown[:, None], np.array([tick.command for tick in log.ticks]), np.nan)

@@ -13,9 +13,11 @@ import xarray as xr
 
 from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE
 from airflock.recordings.imports import (
+    SNIFFED,
     array_readers,
     common_frame,
-    flight_logs,
+    format_words,
+    formats,
     read_tables,
     resampling,
     table_columns,
@@ -33,6 +35,7 @@ from airflock.recordings.imports.track import (
     ImportReport,
     ignore_progress,
 )
+from airflock.recordings.imports.track_checks import SINCE_1970
 from airflock.recordings.reader_process import refuse_archive, refuse_pickle_file
 from airflock.support import RecordingError, as_error, expand_path, is_number
 
@@ -65,19 +68,19 @@ def load_tracks(
     Parameters
     ----------
     source : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
-        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy, .mat), a table, such as
+        A file or several of the formats that airflock import --help lists, a table, such as
         {"t": [...], "id": [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
     map : mapping, optional
         Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z
         (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m), utc (s since 1970),
-        air (1 in flight) and id. Headers with units need none: `x [mm]`, `time_us`. Of files of several arrays
-        `position` is the name of one.
+        air (1 in flight), id and receiver (of which one is read). Headers with units need none: `x [mm]`, `time_us`.
+        Of files of several arrays `position` is the name of one.
     unit : str
         Of lengths that bring none: m, cm, mm, km, ft or px.
     scale : float, optional
         Metres per pixel, with px.
     time_unit : str
-        Of times that bring none: s, ms, us, ns, min or frames.
+        Of times that bring none: s, ms, us, ns, min or frames; of dates that leave it open: dmy or mdy.
     fps : float, optional
         Frames per second, with frames.
     keypoint : str
@@ -169,19 +172,12 @@ def load_tracks(
         "source_software": "airflock import", "source_file": ", ".join(sources), "airflock_comparable": int(comparable),
         "airflock_import": json.dumps({"notes": findings.notes}),
     }  # fmt: skip
-    if _on_ground(tracks, options):
+    if tracks[0].origin is not None or tracks[0].ground or options.axes:  # axes that point east and north
         found.attrs[FRAME_ATTRIBUTE] = EAST_NORTH_UP
     if say is not None:
         for note in findings.notes:
             say(note)
     return found
-
-
-def _on_ground(tracks: list[ImportedTrack], options: ImportOptions) -> bool:
-    """Return True if the axes are known to point east and north, by the site, the autopilot or the user."""
-    first = tracks[0]
-    autopilot = Path(first.source).suffix.lower() in AUTOPILOT_SUFFIXES
-    return first.origin is not None or first.ground or bool(options.axes) or autopilot
 
 
 def read_tracks(
@@ -230,8 +226,7 @@ def read_tracks(
         track_checks.note_resolution(track, findings)
     findings.raise_errors()
     for own in track_checks.tracks_by_source(tracks).values():
-        _question_speeds(own, findings)
-        _question_lengths(own, findings)
+        _question_units(own, findings)
     findings.raise_errors()
     return tracks, comparable
 
@@ -287,54 +282,59 @@ def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
         track.keep(~bad)
 
 
-def _question_speeds(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Ask for the unit of times where no velocity is logged and rows go faster than anything that flies."""
-    rates = [_speeds(track, slice(0, 10_000)) for track in tracks if not track.has(VELOCITY_TARGETS)]
-    usual = float(np.median(rate)) if len(rate := np.concatenate(rates or [np.empty(0)])) else 0.0
-    first = tracks[0]
-    if (
-        "t" in first.user_labels
-        and usual > (MAX_SPEED * 10.0 if first.unitless else MAX_SPEED)
-        and first.time[0] < SINCE_1970
-    ):
-        name = quote_column(first.label("t"))
-        findings.add_error(
-            f"{first.source}: column {first.label('t')}, row {first.rows[0]} on: rows move by {usual:.3g} m/s, faster "
-            f'than anything that flies: if times are days, as in spreadsheets, write --map "t:={name}*86400", if hours '
-            "*3600, if minutes *60; or name the unit of lengths",
-            "time",
-        )
+def _question_units(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Ask for units where nobody has named them and rows show others; of times note what was assumed.
 
-
-def _speeds(track: ImportedTrack, rows: slice) -> Any:
-    """Return how fast those rows move that move at all, m/s."""
-    place = track.stack(POSITION_TARGETS, 2)[rows]
-    speeds = np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(track.time[rows])
-    return speeds[speeds > 0.0]
-
-
-def _question_lengths(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Ask whether positions of a file without a unit are degrees, or smaller than metres."""
-    some = [(track, slice(0, 10_000)) for track in tracks if track.unitless]
-    places = [track.stack(POSITION_TARGETS, 2)[rows] for track, rows in some]
-    moving = np.concatenate([_speeds(track, rows) for track, rows in some] or [np.empty(0)])
-    if len(moving) < 5:
+    Rates and speeds judge all units by one measure: what no animal, robot or camera does is another unit.
+    """
+    some = [(track, slice(0, 10_000)) for track in tracks if len(track.time) > 1]
+    if not some:
         return
-    usual, every, first = float(np.median(moving)), np.abs(np.concatenate(places)), tracks[0]
-    x, y = first.label("x"), first.label("y")
-    line = f"{first.source}: column {x}, {y}, row {first.rows[0]}: no unit, and rows move by {usual:.3g} a second"
-    # A bird makes 1e-4 degrees a second; what moves as little in metres lies about the origin, or stands.
-    far = every.max(axis=0)
-    degrees = far.max() <= 180.0 and far.min() <= 90.0 and np.median(every) > 1.0
-    if usual < SLOWEST and degrees and not first.has(VELOCITY_TARGETS):
-        lon, lat = (y, x) if far[1] > 90.0 else (x, y)
-        ways = f'--map "lon:={quote_column(lon)}" --map "lat:={quote_column(lat)}"'
+    first, places = tracks[0], [track.stack(POSITION_TARGETS, 2)[rows] for track, rows in some]
+    steps = [np.diff(track.time[rows]) for track, rows in some]
+    speeds = [np.linalg.norm(np.diff(place, axis=0), axis=1) / step for place, step in zip(places, steps, strict=True)]
+    moving = np.concatenate(speeds)
+    moving = moving[moving > 0.0]
+    usual = float(np.median(moving)) if len(moving) >= 5 else 0.0
+    step = float(np.median(np.concatenate(steps)))
+    t, x, y = (quote_column(first.label(name)) for name in ("t", "x", "y"))
+    where, row = f"{first.source}: column", f"row {first.rows[0]}"
+    logged = any(track.has(VELOCITY_TARGETS) for track in tracks)
+    if "x" in first.unnamed and usual:
+        line = f"{where} {first.label('x')}, {first.label('y')}, {row}: no unit, and rows move by {usual:.3g} a second"
+        far = np.abs(every := np.concatenate(places)).max(axis=0)
+        # A bird makes 1e-4 degrees a second; what moves as little in metres lies about the origin, or stands.
+        if usual < SLOWEST and not logged and far.max() <= 180.0 and far.min() <= 90.0 and np.median(np.abs(every)) > 1:
+            lon, lat = (y, x) if far[1] > 90.0 else (x, y)
+            findings.add_error(
+                f'{line}: degrees? Write --map "lon:={lon}" --map "lat:={lat}"; if they are metres, --unit m; if times '
+                "are no seconds, for instance --time-unit ms or us"
+            )
+            return
+        if usual > FASTEST:
+            findings.add_error(f"{line}: cm or mm? Write --unit cm, or --unit mm; if they are metres, --unit m")
+            return
+    if logged or "t" not in first.user_labels or first.time[0] >= SINCE_1970:
+        return
+    bare = "t" in first.unnamed
+    line = f"{where} {first.label('t')}, {row} on: {'no unit, and ' * bare}rows move by {usual:.3g} m/s"
+    keep = "; if they are seconds, --time-unit s" if bare else ""
+    if usual > (FASTEST if bare else MAX_SPEED) or (bare and step < QUICKEST):
+        # The shortest unit in which a camera takes the rows, and something flies as fast.
+        units = {"min": 60.0, "h": 3600.0} if bare else {}
+        fit = [unit for unit, long in units.items() if step * long >= QUICKEST and usual <= long * FASTEST]
         findings.add_error(
-            f"{line}: degrees? Write {ways}; if they are metres, --unit m; if times are no seconds, for instance "
-            "--time-unit ms or us"
+            f"{line}, {1 / step:.4g} of them a second, faster than anything that flies or films: "
+            f"{f'Write --time-unit {fit[0]}; or ' if fit else ''}if times are days, as in spreadsheets, write "
+            f'--map "t:={t}*86400", if hours *3600, if minutes *60; or name the unit of lengths{keep}', "time",
+        )  # fmt: skip
+    elif bare and step >= SLOW and (usual <= 1e-3 * FASTEST or "x" in first.unnamed):
+        findings.add_error(f"{line} and are {step:g} apart: ms? Write --time-unit ms{keep}", "time")
+    elif bare:
+        findings.notes.append(
+            f"{where} {first.label('t')} without a unit: taken as s, so that rows are {step:.4g} s apart and move by "
+            f"{usual:.3g} m/s; if not, write for instance --time-unit ms or min"
         )
-    elif usual > FASTEST:
-        findings.add_error(f"{line}: cm or mm? Write --unit cm, or --unit mm; if they are metres, --unit m")
 
 
 def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:
@@ -387,10 +387,15 @@ def _read(what: Any, options: ImportOptions, findings: ImportReport) -> list[Imp
 def _placed(path: Path, tracks: list[ImportedTrack]) -> list[ImportedTrack]:
     """Tracks that have a place at every time; raises RecordingError for one without."""
     for track in tracks:
-        track.fixed_units |= path.suffix.lower() in AUTOPILOT_SUFFIXES
         if not any(set(names) <= set(track.columns) for names in (POSITION_TARGETS[:2], GEODETIC_TARGETS[:2])):
             raise RecordingError(f"{path}: {track.name} has no positions")
     return tracks
+
+
+SLOWEST, FASTEST = 2.5e-3, 100.0  # m/s: usual speeds beyond are in other units, where nobody has named them
+MAX_SPEED = 1000.0  # m/s of usual motion; faster than an aircraft of any kind whose flock could be scored
+QUICKEST = 1.0 / 300.0  # s between rows; only cameras of high speed are quicker, whose files count frames
+SLOW = 5.0  # s between rows; what is as slow may count milliseconds
 
 
 # All options are checked together, so that a user corrects them in one go.
@@ -401,7 +406,7 @@ def check_options(
     errors = findings.errors
     known = {
         "unit": ("", *table_columns.LENGTH_UNITS, *table_columns.PIXEL_UNITS),
-        "time_unit": ("", *table_columns.TIME_UNITS, "frames"),
+        "time_unit": ("", *table_columns.TIME_UNITS, "frames", *table_columns.DATE_ORDERS),
     }
     for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
         value = getattr(options, name)
@@ -446,42 +451,29 @@ def _is_origin(given: Any) -> bool:
     return sound and abs(numbers[0]) <= 90.0 and abs(numbers[1]) <= 360.0
 
 
-# Formats by the ending of a file: to add one, write a reader and name it here.
-Reader = Callable[[Path, ImportOptions, ImportReport], list[ImportedTrack]]
-READERS: dict[str, tuple[str, Reader]] = {
-    ".csv": ("table", read_tables.read_csv),
-    ".tsv": ("table", read_tables.read_csv),
-    ".txt": ("table", read_tables.read_csv),
-    ".parquet": ("table", read_tables.read_parquet),
-    ".ulg": ("PX4 ULog", flight_logs.read_ulog),
-    ".bin": ("ArduPilot DataFlash", flight_logs.read_dataflash),
-    ".tlog": ("MAVLink telemetry", flight_logs.read_tlog),
-    ".log": ("log of a node on board", flight_logs.read_node_log),
-    ".nc": ("movement netCDF", array_readers.read_netcdf),
-    ".h5": ("movement, idtracker.ai or SLEAP HDF5", array_readers.read_netcdf),
-    ".hdf5": ("movement, idtracker.ai or SLEAP HDF5", array_readers.read_netcdf),
-    ".npy": ("NumPy array", array_readers.read_npy),
-    ".npz": ("NumPy arrays", array_readers.read_npy),
-    ".mat": ("MATLAB arrays", array_readers.read_mat),
-}
-
-SLOWEST, FASTEST = 2.5e-3, 100.0  # m/s: usual speeds beyond are no metres, where nobody has said so
-MAX_SPEED = 1000.0  # m/s of usual motion; faster than an aircraft of any kind whose flock could be scored
-SINCE_1970 = 1e8  # s; times beyond count since 1970
-AUTOPILOT_SUFFIXES = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
-
-
 def read_file(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read the tracks of a file; raise RecordingError for an unknown format."""
     if path.is_dir():
         raise RecordingError(f"{path}: is a folder; name the files in it")
     if not path.is_file():
         raise RecordingError(f"{path}: no such file")
-    ending = path.suffix.lower()
     refuse_archive(path)
     refuse_pickle_file(path)
-    if ending not in READERS:
-        known = ", ".join(READERS)
-        raise RecordingError(f"{path}: {ending or 'a name without an ending'}: unknown format; known: {known}")
     with as_error(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged
-        return READERS[ending][1](path, options, findings)
+        tracks: list[ImportedTrack] = _reader_of(path)(path, options, findings)
+    return tracks
+
+
+def _reader_of(path: Path) -> Callable[..., Any]:
+    """Return the reader that the first bytes of a file name, else that of its ending; raise RecordingError."""
+    with path.open("rb") as file:
+        start = file.read(SNIFFED)
+    ending, known = path.suffix.lower(), formats()
+    own = [one for one in known if ending in one.suffixes]
+    readers = [one.load() for one in own or known]
+    fit = [read for read in readers if read.sniff is not None and read.sniff(start)]
+    fit += [read for read in readers if own and read.sniff is None]
+    if not fit:
+        why = f"is no {own[0].name}, of which it has the ending" if own else f"{ending or 'no ending'}: unknown format"
+        raise RecordingError(f"{path}: {why}; known: {format_words()}")
+    return fit[0]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from airflock.recordings.imports import table_columns
+from airflock.recordings.imports import format_words, reader, table_columns
 from airflock.recordings.imports.table_columns import MAX_COLUMNS, ColumnLayout, column_layout
 from airflock.recordings.imports.track import (
     GEODETIC_TARGETS,
@@ -17,6 +17,7 @@ from airflock.recordings.imports.track import (
     ImportedTrack,
     ImportOptions,
     ImportReport,
+    RowFlag,
 )
 from airflock.recordings.imports.track_checks import PLACE_TARGETS
 from airflock.support import RecordingError, trim_heap
@@ -26,12 +27,18 @@ CLOCK = r"\d+:[0-5]\d:[0-5]\d(\.\d+)?"  # hours, minutes, seconds
 CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drones fits
 DAY = 86400.0  # s
 DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y")
+ZONE = r"(?:Z|[+-]\d\d:?\d\d)$"  # behind a date
 FIRST_DATE, LAST_DATE = 6.3e8, 4.2e9  # s since 1970: 1990 and 2103
 PoseColumns = dict[str, dict[str, dict[str, str]]]  # individual → keypoint → component → column
 
 
+@reader("table", suffixes=(".csv", ".tsv", ".txt"))
 def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read the tracks of a text table; raise a RecordingError that names column and row."""
+    """A long table with `id`, one file per individual, or a pair of columns for each: `time, x1, y1, x2, y2, ...`,
+    `time, fish1_x, fish1_y, ...`. Columns are separated by commas, semicolons, tabs, bars or blanks. Lines above the
+    names are left out, whether or not they begin with `#` (EthoVision, NetLogo's BehaviorSpace); a row of units below
+    the names is read (EthoVision, TrackMate).
+    """
     head = read_head(path, options)
     findings.notes += [f"{path}: {note}" for note in head.notes]
     size = path.stat().st_size
@@ -66,8 +73,9 @@ def names_of_individuals(columns: list[str], options: ImportOptions) -> list[str
     return [*named, options.map.get("id", "").strip("'\" ")]
 
 
+@reader("Parquet table", suffixes=(".parquet",), needs="pyarrow")
 def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read the tracks of a Parquet table."""
+    """Columns as of a text; a pandas DataFrame is read in the same way."""
     try:
         import pyarrow
         import pyarrow.parquet as parquet
@@ -123,14 +131,15 @@ def tracks_from_parts(
     pose : individual → keypoint → component → column, where rows above the table say so
     """
     wide: dict[str, dict[str, str]] = {}
-    if not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS)):
-        wide = {} if pose else wide_columns(names)
-        pose = pose or ({} if wide else keypoint_columns(names, stem, options.keypoint))
     if pose:
         wide = _of_keypoint(pose, where, options)
+    elif not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS)):
+        wide = wide_columns(names, where, stem, options)
     how = column_layout(where, first_individual_columns(names, wide) if wide else names, options)
     findings.notes += how.notes
     _choose_id(where, how, parts, findings)
+    if "id" not in options.map:
+        _ask_for_receivers(where, how, parts)
     gathered: dict[str, list[Any]] = {}
     nameless: list[Any] = [np.empty(0, int)]
     columns = None if wide else how.used
@@ -140,8 +149,10 @@ def tracks_from_parts(
         rows = np.arange(at, at + len(part))
         for name, piece in split_by_individual(part, wide, how, stem):
             read = [c for c in how.used if c not in (how.id, how.date, *how.flags)]
-            numbers = {c: _numbers(piece, c, how, at) for c in read}
-            values = how.values(numbers, len(piece)) | {f"flag {c}": _flag_values(piece[c]) for c in how.flags}
+            numbers = {c: _numbers(piece, c, how, at, options) for c in read}
+            values = how.values(numbers, len(piece)) | {
+                f"flag {c}": _flag_values(piece[c], how.flags[c]) for c in how.flags
+            }
             whole = np.all([np.isfinite(values[c]) for c in PLACE_TARGETS if c in values], axis=0)
             whole &= np.isfinite(values["t" if "t" in values else "utc"])
             if how.id:
@@ -160,15 +171,15 @@ def tracks_from_parts(
     tracks = []
     for name in list(gathered):
         tracks.append(_track(name, where, gathered.pop(name), how, bool(how.id or wide), findings))
-    if how.clocks:
-        late = [_pass_midnight(track) for track in tracks]
-        findings.notes += [f"{where}: column {how.clocks[0]}, row {row} goes back by more than 12 h: taken as midnight"
-                           for row in late if row][:1]  # fmt: skip
+    if how.clock:
+        late = [_set_back(track, how.dated) for track in tracks]
+        what = "1 h: taken as the end of summer time" if how.dated else "more than 12 h: taken as midnight"
+        findings.notes += [f"{where}: column {how.clock}, row {row} goes back by {what}" for row in late if row][:1]
     trim_heap()
     return tracks
 
 
-def _numbers(piece: pd.DataFrame, name: str, how: ColumnLayout, at: int) -> Any:
+def _numbers(piece: pd.DataFrame, name: str, how: ColumnLayout, at: int, options: ImportOptions) -> Any:
     """Return a column as float64; raise RecordingError for the first text in it that is no number.
 
     Dates become seconds since 1970, durations seconds. Times may also be texts: dates, or
@@ -176,30 +187,46 @@ def _numbers(piece: pd.DataFrame, name: str, how: ColumnLayout, at: int) -> Any:
     """
     column, time = piece[name], name in how.times
     if pd.api.types.is_numeric_dtype(column):
-        if time and how.date and name == how.user_labels.get("t") and piece[how.date].nunique() > 1:
+        if time and how.date and name == how.labels.get("t") and piece[how.date].nunique() > 1:
             raise RecordingError(
                 f"{how.where}: column {how.date}, row {at} on, holds several dates beside column {name}, whose numbers "
                 f"are no times of day; write one column (2026-05-04T10:00:00), or --map t:={name}*1 if it counts on"
             )
         return column.to_numpy(float, na_value=np.nan)
     if pd.api.types.is_datetime64_any_dtype(column):
-        return _since_1970(column)
-    if pd.api.types.is_timedelta64_dtype(column):
-        return column.dt.total_seconds().to_numpy(float)
-    found, text, given = pd.to_numeric(column, errors="coerce"), *_texts(column)
-    bad = np.flatnonzero((found.isna() & given).to_numpy())
-    if not bad.size:
-        return found.to_numpy(float, na_value=np.nan)
-    if time:
-        when = pd.to_datetime(column, errors="coerce", utc=True, format="ISO8601")
-        if not (when.isna() & given).any():
-            return _since_1970(when)
-        text = text.where(~text.str.fullmatch(SHORT_CLOCK) | (how.date == ""), text + ":00")
-        if text[given].str.fullmatch(CLOCK).all():
-            how.clocks += [] if how.date else [name]
-            days = _days(piece[how.date], how, at) if how.date else 0.0
-            return pd.to_timedelta(text.where(given)).dt.total_seconds().to_numpy(float) + days
-    raise RecordingError(f"{how.where}: column {name}, row {at + bad[0]}: {_no_number(str(column.iloc[bad[0]]), time)}")
+        found = _since_1970(column)
+    elif pd.api.types.is_timedelta64_dtype(column):
+        found = column.dt.total_seconds().to_numpy(float)
+    else:
+        numbers, text, given = pd.to_numeric(column, errors="coerce"), *_texts(column)
+        bad = np.flatnonzero((numbers.isna() & given).to_numpy())
+        if not bad.size:
+            return numbers.to_numpy(float, na_value=np.nan)
+        found = _moments(text.where(given), piece, name, how, at, options) if time else None
+        if found is None:
+            line = f"{how.where}: column {name}, row {at + bad[0]}"
+            raise RecordingError(f"{line}: {_no_number(str(column.iloc[bad[0]]), time)}")
+    how.name_units(target for target, source in how.sources.items() if source.label == name)
+    return found
+
+
+def _moments(text: Any, piece: pd.DataFrame, name: str, how: ColumnLayout, at: int, options: ImportOptions) -> Any:
+    """Return texts of dates or times of day in seconds; None where some are neither."""
+    when, days = pd.to_datetime(text, errors="coerce", utc=True, format="ISO8601"), None
+    iso = not (when.isna() & text.notna()).any()
+    if how.date and not iso:
+        days = _days(piece[how.date], how.date, how, at, options)
+    elif not iso and text.dropna().str.contains(r"^\d\S*\s").all():  # a date, a blank, and the time of day
+        parts = text.str.split(n=1, expand=True)
+        days, text = _days(parts[0], name, how, at, options), parts[1]
+    if days is not None:
+        text = text.where(~text.str.fullmatch(SHORT_CLOCK, na=False), text + ":00")
+    if not iso and not text.dropna().str.fullmatch(CLOCK).all():
+        return None
+    if not (iso and text.dropna().str.contains(ZONE).any()):
+        how.clock, how.dated = name, iso or days is not None
+    seconds = None if iso else pd.to_timedelta(text).dt.total_seconds().to_numpy(float)
+    return _since_1970(when) if seconds is None else seconds + (0.0 if days is None else days)
 
 
 def _texts(column: Any) -> tuple[Any, Any]:
@@ -208,26 +235,28 @@ def _texts(column: Any) -> tuple[Any, Any]:
     return text, column.notna() & (text != "")
 
 
-def _days(column: Any, how: ColumnLayout, at: int) -> Any:
-    """Return the midnights of dates, s since 1970; raise RecordingError for other texts, and for 04/05/2026."""
+def _days(column: Any, name: str, how: ColumnLayout, at: int, options: ImportOptions) -> Any:
+    """Return the midnights of dates, s since 1970; raise RecordingError for other texts, and ask about 04/05/2026."""
     if pd.api.types.is_datetime64_any_dtype(column):
         return _since_1970(column.dt.normalize())
     text, given = _texts(column)
-    read = [pd.to_datetime(text.where(given), format=form, errors="coerce") for form in DATES]
-    whole = [when for when in read if not (when.isna() & given).any()]
-    other = [~when.eq(whole[0]) & given for when in whole[1:]] if whole else [read[0].isna() & given]
+    read = {form: pd.to_datetime(text.where(given), format=form, errors="coerce") for form in DATES}
+    whole = [(form, when) for form, when in read.items() if not (when.isna() & given).any()]
+    # A whole column may show which of the numbers is no month; if none does, the user is asked.
+    if len(whole) > 1 and options.use("time_unit") in table_columns.DATE_ORDERS:
+        whole = [one for one in whole if re.sub("[^dmY]", "", one[0]).lower() == options.time_unit]
+    other = [~when.eq(whole[0][1]) & given for _, when in whole[1:]] if whole else [read[DATES[0]].isna() & given]
     bad = np.flatnonzero(np.any(other, axis=0)) if other else np.empty(0, int)
     if bad.size:
-        why = "may have the day or the month first" if whole else "is no date"
-        raise RecordingError(
-            f"{how.where}: column {how.date}, row {at + bad[0]}: {text.iloc[bad[0]]} {why}; write dates as 2026-05-04"
-        )
-    return _since_1970(whole[0])
+        why = "may have the day or the month first; write --time-unit dmy, or --time-unit mdy" if whole else (
+            "is no date; write dates as 2026-05-04")  # fmt: skip
+        raise RecordingError(f"{how.where}: column {name}, row {at + bad[0]}: {text.iloc[bad[0]]} {why}")
+    return _since_1970(whole[0][1])
 
 
 def _unit_of_dates(how: ColumnLayout, gathered: dict[str, list[Any]], findings: ImportReport) -> None:
     """Convert times without a unit that can only be milli-, micro- or nanoseconds since 1970; note what was assumed."""
-    for target in {"t", "utc"} & set(how.unitless):
+    for target in [name for name in ("t", "utc") if name in how.sources and how.sources[name].bare]:
         pieces = [piece[0] for parts in gathered.values() for piece in parts]
         ticks = pieces[0][target][np.isfinite(pieces[0][target])]
         usual, row = float(np.median(ticks)) if len(ticks) else 0.0, next(iter(gathered.values()))[0][1][0]
@@ -235,24 +264,43 @@ def _unit_of_dates(how: ColumnLayout, gathered: dict[str, list[Any]], findings: 
                 if FIRST_DATE <= usual * factor <= LAST_DATE]  # fmt: skip
         if not fits and usual <= 1e11:
             continue
-        line = f"{how.where}: column {how.user_labels[target]}, row {row}: {usual:.6g} has no unit"
+        line = f"{how.where}: column {how.labels[target]}, row {row}: {usual:.6g} has no unit"
         unit, factor = fits[0] if fits else ("s", 1.0)
         step = factor * float(np.median(np.abs(np.diff(ticks)))) if len(ticks) > 1 else 0.0
         # Hours from row to row are fixes of animals on the earth; in a local frame it is a clock with finer ticks.
-        if not fits or (step > 3600.0 and "lat" not in how.expressions):
+        if not fits or (step > 3600.0 and "lat" not in how.sources):
             reason = f"as {unit} since 1970 it is no date of ours, or rows are {step:.3g} s apart"
             raise RecordingError(f"{line}; {reason}; write --time-unit ms, us or ns")
         others = " or ".join(other for other in ("s", "ms", "us", "ns") if other != unit)
         date = np.datetime64(int(usual * factor), "s").item()
         findings.notes.append(f"{line}: taken as {unit} since 1970 ({date:%Y-%m-%d}); if not, --time-unit {others}")
+        how.name_units([target])
         for piece in pieces:
             piece[target] *= factor
 
 
-def _pass_midnight(track: ImportedTrack) -> int:
-    """Add a day wherever times of day go back by more than half of one; return the first such row, or 0."""
-    back = np.diff(track.time, prepend=track.time[:1]) < -0.5 * DAY
-    track.time = track.time + DAY * np.cumsum(back)
+def _set_back(track: ImportedTrack, dated: bool) -> int:
+    """Add the time by which a local clock goes back at midnight, or at the end of summer time if `dated`; s.
+
+    Returns the first such row, or 0.
+    """
+    steps = np.diff(track.time, prepend=track.time[:1])
+    if not dated:
+        by, back = DAY, steps < -0.5 * DAY
+    else:
+        usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+        by, ahead = 3600.0, steps + 3600.0
+        back = (steps <= 0.0) & (ahead > 0.0) & (ahead < max(1.5 * usual, min(5.0 * usual, 900.0)))
+        # The last Sunday of October (Europe), the first of November (America) or April (Australia); in any other night
+        # a row is one that came late. 1 January 1970 was a Thursday.
+        days = np.nan_to_num(track.time // DAY).astype("datetime64[D]")
+        months = days.astype("datetime64[M]")
+        number, of_year = (days - months).astype(int), months.astype(int) % 12
+        back &= (days.astype(int) % 7 == 3) & (
+            ((of_year == 9) & (number > 23)) | (np.isin(of_year, (3, 10)) & (number < 7))
+        )
+        back[0] = False
+    track.time = track.time + by * np.cumsum(back)
     return int(track.rows[back.argmax()]) if back.any() else 0
 
 
@@ -273,14 +321,19 @@ FLAG_WORDS = {"true": 1, "t": 1, "yes": 1, "a": 1, "false": 0, "f": 0, "no": 0, 
               "invalid": 0, "valid": 1, "ok": 1}  # fmt: skip
 
 
-def _flag_values(column: Any) -> Any:
+def _flag_values(column: Any, flag: RowFlag) -> Any:
     """Return a column that says which rows count as float64; nan where it is empty or says nothing that is known."""
     if pd.api.types.is_numeric_dtype(column):
         return column.to_numpy(float, na_value=np.nan)
+    if flag.words == "receiver":
+        return column.map(
+            lambda name: flag.numbers.setdefault(str(name), len(flag.numbers)), na_action="ignore"
+        ).to_numpy(float)
     text = column.astype(str).str.strip().str.lower()
     return pd.to_numeric(text, errors="coerce").fillna(text.map(FLAG_WORDS)).to_numpy(float)
 
 
+DEVICES = re.compile(r"device|receiver|instance|serial|logger|sensor.?id", re.IGNORECASE)
 TAGS = ("tag", "tag_local_identifier")  # which several animals wear in turn
 
 
@@ -291,7 +344,7 @@ def _choose_id(where: str, how: ColumnLayout, parts: Any, findings: ImportReport
     name is. Raises RecordingError where names number the rows and these may be of several
     individuals.
     """
-    clock = table_columns.column_names(how.expressions["t" if "t" in how.expressions else "utc"])[:1]
+    clock = table_columns.column_names(how.sources["t" if "t" in how.sources else "utc"].tree)[:1]
     pieces = parts([*how.ids, *clock]) if how.ids and clock else iter(())
     _, part = next(pieces, (0, None))
     if part is None or part[clock[0]].nunique() < 2:  # one instant has a row for each individual
@@ -319,6 +372,25 @@ def _choose_id(where: str, how: ColumnLayout, parts: Any, findings: ImportReport
         )
     how.id = ""
     findings.notes.append(f"{line}: all rows taken as one individual's; otherwise write --map id:=COLUMN")
+
+
+def _ask_for_receivers(where: str, how: ColumnLayout, parts: Any) -> None:
+    """Raise RecordingError if a column that is not read may part receivers, or individuals, at the same times."""
+    columns = [column for column in how.unread if DEVICES.search(column) and column != how.id]
+    clock = [name for name in how.times if name][:1]
+    _, part = (
+        next(parts([*columns, *clock, *([how.id] if how.id else [])]), (0, None)) if columns and clock else (0, None)
+    )
+    for column in columns if part is not None else ():
+        own = part.dropna(subset=[column, *clock]).groupby([*([how.id] if how.id else []), column])[clock[0]]
+        spans = own.agg(["min", "max", "size"])
+        spans = spans[spans["size"] > 2].sort_values("min")
+        for _, each in spans.groupby(level=0) if how.id else [("", spans)]:
+            if (each["min"].iloc[1:].to_numpy() < each["max"].iloc[:-1].to_numpy()).any():
+                raise RecordingError(
+                    f"{where}: column {column} has {len(each)} names at the same times: write --map receiver:={column} "
+                    f"if they are receivers of one drone, or --map id:={column} if they are individuals"
+                )
 
 
 def _since_1970(column: Any) -> Any:
@@ -360,10 +432,10 @@ def _track(
     if utc is not None and utc is not time and np.isfinite(utc + time).any():
         pair = np.stack([time, utc], axis=1)[np.isfinite(utc + time)]
     air = columns.pop("air") > 0.5 if "air" in columns else None
-    found = ImportedTrack(name, where, time, columns, rows, dict(how.user_labels), clock, pair, how.datum)
+    found = ImportedTrack(name, where, time, columns, rows, how.labels, clock, pair, how.datum)
     found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
     found.in_air, found.ground, found.flags, found.fixed_units = air, how.ground, flags, how.fixed_units
-    found.unitless = {"x", "y"} <= set(how.unitless)
+    found.unnamed = frozenset(target for target, source in how.sources.items() if source.bare)
     return found
 
 
@@ -448,7 +520,7 @@ def _line_of_names(lines: list[str], delimiter: str, options: ImportOptions) -> 
     for i in range(first, min(first + MOST_ABOVE, len(lines))):
         names = _cells(lines[i], delimiter or _delimiter(lines[i], lines[i + 1 : i + 2]))[: MAX_COLUMNS + 1]
         targets = {meaning.target for meaning in map(table_columns.header_meaning, names) if meaning}
-        places = targets & {"x", "lat"} or set(wide_columns(names))
+        places = targets & {"x", "lat"} or column_groups(names)
         if (targets & {"t", "utc", "frame"} and places) or (mapped and mapped <= set(words.findall(lines[i]))):
             return i
     counted = re.match(r'"?Number of header lines:"?[;,\t]"?(\d+)', "".join(lines[first : first + 1]))
@@ -488,7 +560,7 @@ def _lines(path: Path) -> tuple[str, list[str]]:
     if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
         encoding = "utf-16"
     elif b"\0" in start:
-        raise RecordingError(f"{path}: is not text; known formats: .csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy")
+        raise RecordingError(f"{path}: is not text; known formats: {format_words()}")
     else:
         encoding = "utf-8-sig"
     try:
@@ -541,69 +613,78 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
             )
 
 
-KEYPOINT = re.compile(r"(.+)_([xyz]|score|likelihood|confidence)")
-
-# Wide tables: columns for each individual, as x1, y1, x2, y2 or fish1_x, fish1_y, fish2_x, fish2_y.
+# Columns for each individual or place, as x1, y1, x2, y2 or fish1_x, fish1_y, fish2_x, fish2_y, head.x, head.y.
 AXIS_FIRST = re.compile(r"([xyz])_?(\d+)")
-NAME_FIRST = re.compile(r"([a-z][a-z_]*?_?\d+)_([xyz])")  # a number: head_x, tail_x are places on one individual
+NAME_FIRST = re.compile(r"(.+)_([xyz]|score|likelihood|confidence)")
+NUMBERED = re.compile(r"([a-z][a-z_]*?_?)?\d+")  # names of individuals; head_x, tail_x are places on one individual
 
 
-def wide_columns(names: list[str]) -> dict[str, dict[str, str]]:
-    """Return individual → component → column, of a table such as time, x1, y1, x2, y2; empty for a long table."""
-    found: dict[str, dict[str, str]] = {}
-    plain = [table_columns.split_header(name)[0] for name in names]
-    numbered = any(name in table_columns.ALIASES["id"] for name in plain)  # then leg1_x, leg2_x are keypoints
-    if any(name in table_columns.ALIASES["x"] for name in plain):
-        return found
-    for name, text in zip(names, plain, strict=True):
-        first, second = AXIS_FIRST.fullmatch(text), NAME_FIRST.fullmatch(text)
-        if first:
-            found.setdefault(first[2], {})[first[1]] = name
-        elif second and not numbered:
-            found.setdefault(second[1], {})[second[2]] = name
-    return found if found and all({"x", "y"} <= set(parts) for parts in found.values()) else {}
+def column_groups(names: list[str]) -> dict[str, dict[str, str]]:
+    """Return name → component → column, of columns for each individual or each place on one body."""
+    groups: dict[str, dict[str, str]] = {}
+    for header in names:
+        plain = table_columns.split_header(header)[0]
+        if match := AXIS_FIRST.fullmatch(plain):
+            groups.setdefault(match[2], {})[match[1]] = header
+        elif (match := NAME_FIRST.fullmatch(plain)) and not _is_speed(header, match[1]):
+            own = header.strip()[: len(match[1])]  # as the user writes it
+            groups.setdefault(own if own.lower() == match[1] else match[1], {})[match[2]] = header
+    return groups
 
 
-def keypoint_columns(names: list[str], stem: str, keypoint: str) -> PoseColumns:
-    """Return places on one body, as head.x and head.y of SLEAP, of a table without other positions; else empty."""
-    plain = [table_columns.split_header(name)[0] for name in names]
-    meanings = [table_columns.header_meaning(name) for name in names]
-    if {meaning.target for meaning in meanings if meaning} & {*POSITION_TARGETS, *GEODETIC_TARGETS}:
-        return {}
-    found: dict[str, dict[str, str]] = {}
-    for name, text in zip(names, plain, strict=True):
-        if match := KEYPOINT.fullmatch(text):
-            found.setdefault(match[1], {})[match[2]] = name
-    whole = {keypoint: parts for keypoint, parts in found.items() if {"x", "y"} <= set(parts)}
+def _is_speed(header: str, name: str) -> bool:
+    """Return True for vel_x and v_x_ms, beside individuals that may be called V and C."""
+    meaning = table_columns.header_meaning(header)
+    return meaning is not None and (len(name) > 1 or meaning.unit in table_columns.SPEED_UNITS)
+
+
+def wide_columns(names: list[str], where: str, stem: str, options: ImportOptions) -> dict[str, dict[str, str]]:
+    """Return individual → component → column, of a table such as time, x1, y1, x2, y2; empty for a long table.
+
+    Raises RecordingError where the names may be those of individuals or of places on one body.
+    """
+    meanings = map(table_columns.header_meaning, names)
+    targets = {meaning.target for meaning in meanings if meaning}
+    groups = {} if {"x", "lat"} & targets else column_groups(names)
+    whole = {name: parts for name, parts in groups.items() if {"x", "y"} <= set(parts)}
     # One pair such as goal_x and goal_y holds no positions unless somebody says so, or a tracker gives it a score.
     scored = any(len(set(parts) - {*POSITION_TARGETS}) for parts in whole.values())
     for parts in whole.values():
         parts.pop("score", None)  # of SLEAP, which is no likelihood
-    return {stem: whole} if len(whole) > 1 or scored or set(whole) == {keypoint} else {}
+    if whole and options.map.get("id", "").strip() == "columns":
+        options.used.add("map id")
+        return whole
+    # Beside a column of names, leg1_x and leg2_x are places on one body.
+    if "id" not in targets and len(whole) == len(groups) and all(NUMBERED.fullmatch(name.lower()) for name in whole):
+        return whole
+    if len(whole) < 2 and not scored and set(whole) != {options.keypoint}:
+        return {}
+    return _of_keypoint({stem: whole}, where, options, "; or if each is an individual, write --map id:=columns")
 
 
-def choose_keypoint(names: list[str], options: ImportOptions, where: str) -> str:
+def choose_keypoint(names: list[str], options: ImportOptions, where: str, other: str = "") -> str:
     """Return the keypoint that the user chose, or the only one; raise RecordingError with those that there are."""
     chosen = options.use("keypoint") or (names[0] if len(names) == 1 else "")
     if chosen not in names:
         shown = ", ".join(names[:8])
         if chosen:
             raise RecordingError(f"{where}: no keypoint {chosen}; it has {shown}")
-        raise RecordingError(f"{where}: has {len(names)} keypoints ({shown}); choose one: --keypoint {names[0]}")
+        way = f"choose one: --keypoint {names[0]}{other}"
+        raise RecordingError(f"{where}: has {len(names)} keypoints ({shown}); {way}")
     return chosen
 
 
-def _of_keypoint(pose: PoseColumns, where: str, options: ImportOptions) -> dict[str, dict[str, str]]:
+def _of_keypoint(pose: PoseColumns, where: str, options: ImportOptions, other: str = "") -> dict[str, dict[str, str]]:
     """Return individual → component → column of the keypoint that the user chose, or of the only one."""
     keypoints = list(dict.fromkeys(keypoint for parts in pose.values() for keypoint in parts))
-    chosen = choose_keypoint(keypoints, options, where)
+    chosen = choose_keypoint(keypoints, options, where, other)
     return {individual: parts[chosen] for individual, parts in pose.items() if chosen in parts}
 
 
 def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) -> list[str]:
     """Return the columns of the first individual of a wide table, by the names of a long one."""
-    taken = {column for parts in wide.values() for column in parts.values()}
-    first = next(iter(wide.values()))
+    grouped = [*wide.values(), *column_groups(names).values()]
+    taken, first = {column for parts in grouped for column in parts.values()}, next(iter(wide.values()))
     unit = {part: table_columns.split_header(column)[1] for part, column in first.items()}
     return [n for n in names if n not in taken] + [f"{part} [{unit[part]}]" if unit[part] else part for part in first]
 
@@ -616,7 +697,7 @@ def split_by_individual(
         return [(stem, table)]
     taken = [column for parts in wide.values() for column in parts.values()]
     rest = table.drop(columns=taken)
-    axes = {layout.user_labels[axis]: axis for axis in POSITION_TARGETS if axis in layout.user_labels}
+    axes = {layout.labels[axis]: axis for axis in POSITION_TARGETS if axis in layout.labels}
     axes |= {part: part for part in next(iter(wide.values())) if part not in POSITION_TARGETS}  # such as a likelihood
     return (
         (number, rest.assign(**{label: table[parts[axis]] for label, axis in axes.items() if axis in parts}))

@@ -12,6 +12,7 @@ from airflock.recordings.imports.track_checks import median_period
 from airflock.support import RecordingError, trim_heap
 
 MOST = 2_000_000_000  # numbers of one recording
+MOST_FRAMES = 1000  # for each row of the tracks; a slip of the pen makes more, and nothing new is in them
 NORMAL = 1.5  # times the usual step: longer is a gap
 NTSC = 1.001  # colour television is slower than its nominal rate by this factor (SMPTE 170M)
 SLOWEST_CAMERA = 1.0  # s between frames; slower rows are fixes, which are minutes apart and no rates of television
@@ -29,9 +30,13 @@ def time_grid(
     its times are theirs.
     """
     usual = [median_period(track) for track in tracks if len(track.time) > 1]
-    period = 1.0 / rate if rate else (float(np.median(usual)) if usual else 1.0)
-    if not rate:
-        period = _round(period)
+    own = float(np.median(usual)) if usual else 1.0
+    if rate and rate * own > MOST_FRAMES:
+        raise RecordingError(
+            f"--rate {rate:g}: {rate * own:.4g} frames for each row, of which there are {1 / own:.4g} a second; write "
+            f"--rate {MOST_FRAMES / own:.4g} or less"
+        )
+    period = 1.0 / rate if rate else _round(own)
     first = float(min(track.time[0] for track in tracks))
     if begin is not None:
         early = np.floor((first - begin + grid_tolerance(period, first, begin)) / period)

@@ -2,7 +2,7 @@
 
 import ast
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from airflock.recordings.imports.track import (
     COMMAND_TARGETS,
-    GEODETIC_TARGETS,
     POSITION_TARGETS,
     TARGETS,
     VELOCITY_TARGETS,
@@ -29,6 +28,7 @@ OTHER_COMMAND_UNITS = ("1", "m/s^2")  # units of commands that are headings or a
 ANGLES = {"deg": 1.0, "°": 1.0, "degrees": 1.0}
 PIXEL_UNITS = ("px", "pixel", "pixels")
 FRAME_UNITS = ("frame", "frames")
+DATE_ORDERS = ("dmy", "mdy")  # of --time-unit: order of the numbers of dates that leave it open
 SPELLINGS = (  # of units, after the unit itself
     "m metre metres meter meters", "cm centimetre centimetres centimeter centimeters",
     "mm millimetre millimetres millimeter millimeters", "km kilometre kilometres kilometer kilometers",
@@ -39,11 +39,13 @@ SPELLINGS = (  # of units, after the unit itself
     "mm/s mm/sec", "ft/s ft/sec", "km/h kph kmph km/hr km_h", "kt kts knot knots", "mph mi/h",
 )  # fmt: skip
 UNIT_WORDS = {word: line.split()[0] for line in SPELLINGS for word in line.split()[1:]}
+# Words of units that name a column of times alone; short ones have other meanings, too.
+TIME_WORDS = {word for word, unit in UNIT_WORDS.items() if unit in TIME_UNITS and word.endswith("s") and len(word) > 3}
 UNIT_HINT = "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # for a length without a unit
 
 _EAST, _NORTH, _UP = ("x", "e", "east", "easting"), ("y", "n", "north", "northing"), ("z", "u", "up")
 ALIASES: dict[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "seconds", "datetime", "date_time", "time_boot"),
+    "t": ("t", "time", "timestamp", "datetime", "date_time", "time_boot"),
     "frame": ("frame", "frames", "frame_idx", "frame_index", "frame_number"),
     "id": ("id", "individual", "agent", "drone", "track", "track_id", "trackid", "animal", "tag", "identity", "name",
            "individual_local_identifier", "tag_local_identifier", "fish", "bird", "ant", "subject", "uav", "vehicle",
@@ -106,6 +108,8 @@ def split_header(header: str) -> tuple[str, str]:
     plain = _plain(text)
     if plain == "timeus":  # as ArduPilot writes it
         return "time", "us"
+    if plain in TIME_WORDS:
+        return "time", UNIT_WORDS[plain]
     # Known names first: a name that ends like a unit, such as pos_m, may be a column of its own.
     if plain not in _TARGET:
         for unit in _SUFFIXES:
@@ -132,25 +136,23 @@ def header_meaning(header: str) -> HeaderMeaning | None:
     return None if target is None else HeaderMeaning(target, unit, 1.0, DATUMS.get(name, ""))
 
 
+UNITS_OF = {
+    **dict.fromkeys(("t", "utc"), TIME_UNITS), **dict.fromkeys((*POSITION_TARGETS, "alt"), LENGTH_UNITS),
+    **dict.fromkeys((*VELOCITY_TARGETS, *COMMAND_TARGETS), SPEED_UNITS),
+}  # fmt: skip
+
+
 def column_factor(target: str, unit: str, where: str, options: ImportOptions) -> float:
     """Return the factor that converts a column to SI; raise RecordingError for a unit of something else.
 
     unit : of the header; if empty, that of the options
     """
-    kind = {"t": TIME_UNITS, "utc": TIME_UNITS, "lat": ANGLES, "lon": ANGLES, "alt": LENGTH_UNITS}.get(target)
+    kind = UNITS_OF.get(target)
     if kind is None:
-        kind = (
-            LENGTH_UNITS
-            if target in POSITION_TARGETS
-            else SPEED_UNITS
-            if target in (*VELOCITY_TARGETS, *COMMAND_TARGETS)
-            else {}
-        )
-    if not kind or target in GEODETIC_TARGETS[:2]:
         return 1.0
     # An option is of use where the header has no unit, or the same one.
     option = "time_unit" if target in ("t", "utc") else "unit" if target in (*POSITION_TARGETS, "alt") else ""
-    if option and unit in ("", getattr(options, option)) and getattr(options, option) != "frames":
+    if option and unit in ("", getattr(options, option)) and getattr(options, option) not in ("frames", *DATE_ORDERS):
         unit = options.use(option)
     # A length unit on the command line means the same unit per second for velocities.
     if not unit and target in (*VELOCITY_TARGETS, *COMMAND_TARGETS) and options.unit not in ("", *PIXEL_UNITS):
@@ -251,7 +253,7 @@ def row_flags(columns: Sequence[str], layout: "ColumnLayout", px4: bool) -> dict
     """Return the columns that say which rows count, with their meanings; none that is read as something else."""
     plain = {column: split_header(column)[0] for column in columns if column not in layout.used}
     known = ROW_FLAGS | (dict.fromkeys(VALID, ESTIMATED) if px4 else {})
-    known |= OF_SATELLITES if "lat" in layout.expressions else {}
+    known |= OF_SATELLITES if "lat" in layout.sources else {}
     known |= OF_ARDUPILOT if any(_plain(column) == "timeus" for column in columns) else {}
     return {column: known[name] for column, name in plain.items() if name in known}
 
@@ -356,41 +358,62 @@ MAX_COLUMNS = 2000
 OF_A_TRACKER = ("probability", "likelihood", "score", "confidence", "wcentroid")
 
 
+class Source(NamedTuple):
+    """Where a quantity is read.
+
+    tree  : an expression of columns; factor : of its values to SI
+    label : the user's word for it, which can stand in further expressions; bare : whether nobody has named its unit
+    """
+
+    tree: ast.expr
+    factor: float
+    label: str
+    bare: bool = False
+
+
 @dataclass
 class ColumnLayout:
-    """Layout of a table: target → expression and factor; the column of names; notes for the user."""
+    """Layout of a table: target → where it is read; the column of names; notes for the user."""
 
     where: str
-    expressions: dict[str, Any] = field(default_factory=dict)
-    factors: dict[str, float] = field(default_factory=dict)
-    user_labels: dict[str, str] = field(default_factory=dict)
+    sources: dict[str, Source] = field(default_factory=dict)
     id: str = ""  # a column, or "" where the whole file is one individual
     datum: str = ""
     ground: bool = False  # whether its axes are known to point east and north
     date: str = ""  # a column of days beside times of day
-    clocks: list[str] = field(default_factory=list)  # columns of times of day without a date
-    unitless: list[str] = field(default_factory=list)  # targets whose unit nobody has named
+    clock: str = ""  # a column of local times: times of day, or dates without a zone if `dated`
+    dated: bool = False
     notes: list[str] = field(default_factory=list)
     fixed_units: bool = False  # of PX4's fields
     ids: list[str] = field(default_factory=list)  # all columns of names, if none is mapped
     flags: dict[str, RowFlag] = field(default_factory=dict)  # columns that say which rows count
+    unread: tuple[str, ...] = ()  # all other columns
 
     @property
     def used(self) -> list[str]:
         """Return the columns that are needed."""
-        found = [name for tree in self.expressions.values() for name in column_names(tree)]
+        found = [name for source in self.sources.values() for name in column_names(source.tree)]
         return list(dict.fromkeys(found + [name for name in (self.id, self.date, *self.flags) if name]))
 
     @property
     def times(self) -> list[str]:
         """Return the columns of times that are read alone, so that they may be texts."""
-        return [single_column(self.expressions[target]) for target in ("t", "utc") if target in self.expressions]
+        return [single_column(self.sources[target].tree) for target in ("t", "utc") if target in self.sources]
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Return the user's words of all targets."""
+        return {target: source.label for target, source in self.sources.items()}
+
+    def name_units(self, targets: Iterable[str]) -> None:
+        """Note that these units are known after all."""
+        self.sources |= {name: self.sources[name]._replace(bare=False) for name in targets if name in self.sources}
 
     def values(self, table: Mapping[str, NDArray[np.float64]], count: int) -> dict[str, NDArray[np.float64]]:
         """Return the targets in SI units."""
         return {
-            target: np.broadcast_to(self.factors[target] * evaluate(tree, table), count).astype(float)
-            for target, tree in self.expressions.items()
+            target: np.broadcast_to(source.factor * evaluate(source.tree, table), count).astype(float)
+            for target, source in self.sources.items()
         }
 
 
@@ -407,13 +430,19 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
     errors: list[str] = []
     options, notes = px4_options(where, columns, options)
     found = ColumnLayout(where, notes=notes)
-    other = [column for column in columns if _commands_no_velocity(column)]
+    wishes = [column for column in columns if _commands_no_velocity(column)]
+    clock = [column for column in columns if _plain(column) in TIME_WORDS]  # hours, minutes, seconds: parts of one time
+    other = [*wishes, *(clock if len(clock) > 1 else ())]
+    _each(options.map, lambda target: _mapped(found, target, columns, options), errors)
+    known = sorted(columns, key=lambda c: split_header(c)[0] in PROGRAM_WORDS or _plain(c) in TIME_WORDS)
+    # A column that --map reads alone has the meaning that the map gives it, and no second one.
+    mapped = {names[0] for source in found.sources.values() if len(names := column_names(source.tree)) == 1}
+    rest = [column for column in known if column not in {*other, *mapped}]
+    _each(rest, lambda column: _recognised(found, column, options), errors)
     with collect_errors(errors):
-        _mapped(found, columns, options)
-    with collect_errors(errors):
-        _recognised(found, [column for column in columns if column not in other], options)
-    if other:
-        found.notes.append(f"{where}: {', '.join(other)}: no commanded velocity: left out")
+        _note_bare_lengths(found, columns, mapped, options)
+    if wishes:
+        found.notes.append(f"{where}: {', '.join(wishes)}: no commanded velocity: left out")
     # Missing targets are only reported if all columns could be read: they may be the unreadable
     # ones.
     whole = not errors
@@ -421,18 +450,23 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
     if whole:
         _complete(found, columns, errors)
         _note_unread(found, columns, options)
-    dates = [column for column in columns if split_header(column)[0] in DATE_WORDS and column not in found.times]
-    found.date = dates[0] if dates else ""
+    found.date = next((c for c in columns if split_header(c)[0] in DATE_WORDS and c not in found.times), "")
     if errors:
         raise RecordingError("\n".join(errors))
-    found.ground = bool(options.axes) or split_header(found.user_labels.get("x", ""))[0] in EAST_HEADERS
+    found.ground = bool(options.axes) or split_header(found.labels.get("x", ""))[0] in EAST_HEADERS
     _ned(found, options)
     px4 = found.fixed_units = options.axes == "ned" and is_px4_log(columns)
     for name in ORIGIN if px4 and set(columns) >= set(ORIGIN) else ():
-        found.expressions[name], found.factors[name] = parse_expression(repr(name), name), 1.0
-        found.user_labels[name] = name
-    found.flags = row_flags(columns, found, px4)
+        found.sources[name] = Source(parse_expression(repr(name), name), 1.0, name)
+    found.flags = row_flags(columns, found, px4) | found.flags
+    found.unread = tuple(column for column in columns if column not in found.used)
     return found
+
+
+def _each(names: Iterable[str], read: Callable[[str], None], errors: list[str]) -> None:
+    for name in names:
+        with collect_errors(errors):
+            read(name)
 
 
 def _commands_no_velocity(column: str) -> bool:
@@ -441,93 +475,77 @@ def _commands_no_velocity(column: str) -> bool:
     return meaning is not None and meaning.target in COMMAND_TARGETS and meaning.unit in OTHER_COMMAND_UNITS
 
 
-def _mapped(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
-    errors = []
-    for target, text in options.map.items():
-        try:
-            if target not in TARGETS:
-                hint = suggest(target, TARGETS, f"known: {', '.join(TARGETS)}", cutoff=0.6)
-                raise RecordingError(f"--map {target}:={text}: no target {target}; {hint}")
-            if target == "id" and text.strip() == "file":
-                options.used.add("map id")
-                continue
-            options.used.add(f"map {target}")
-            tree = parse_expression(quote_names(text, columns), target)
-            check_columns(tree, columns, found.where, target)
-            if target == "id":
-                found.id = single_column(tree)
-                if not found.id:
-                    raise RecordingError(f"--map id:={text}: give one column, or file")
-                continue
-            one = single_column(tree)
-            meaning = header_meaning(one) if one else None
-            unit = split_header(one)[1] if one else ""
-            # A label in parentheses can stand in further expressions, as messages write them.
-            found.expressions[target], found.user_labels[target] = tree, one or f"({text.strip()})"
-            if target == "t" and meaning is not None and meaning.target == "frame" and not options.time_unit:
-                found.factors[target] = frame_length(f"{found.where}: column {one}", options)
-                continue
-            found.factors[target] = column_factor(target, unit, found.where, options) if one else 1.0
-            found.unitless += [target] if one and _unitless(target, unit, options) else []
-            if target == "alt" and meaning is not None:
-                found.datum = meaning.datum
-        except RecordingError as error:
-            errors.append(str(error))
-    if errors:
-        raise RecordingError("\n".join(errors))
+def _mapped(found: ColumnLayout, target: str, columns: Sequence[str], options: ImportOptions) -> None:
+    """Read a target as --map says."""
+    text = options.map[target]
+    if target not in TARGETS:
+        hint = suggest(target, TARGETS, f"known: {', '.join(TARGETS)}", cutoff=0.6)
+        raise RecordingError(f"--map {target}:={text}: no target {target}; {hint}")
+    if target == "id" and text.strip() in ("file", "columns"):  # columns: of a table with some for each individual
+        options.used.update({"map id"} if text.strip() == "file" else ())
+        return
+    options.used.add(f"map {target}")
+    tree = parse_expression(quote_names(text, columns), target)
+    check_columns(tree, columns, found.where, target)
+    one = single_column(tree)
+    if target in ("id", "receiver"):
+        if not one:
+            raise RecordingError(f"--map {target}:={text}: give one column{', or file' * (target == 'id')}")
+        found.id = one if target == "id" else found.id
+        found.flags |= {one: RECEIVER._replace(numbers={})} if target == "receiver" else {}
+        return
+    label = one or f"({text.strip()})"
+    meaning = header_meaning(one) if one else None
+    if target == "t" and meaning is not None and meaning.target == "frame" and not options.time_unit:
+        found.sources[target] = Source(tree, frame_length(f"{found.where}: column {one}", options), label)
+        return
+    unit = split_header(one)[1] if one else ""
+    factor = column_factor(target, unit, found.where, options) if one else 1.0
+    found.sources[target] = Source(tree, factor, label, bool(one) and _is_bare(target, unit, options))
+    if target == "alt" and meaning is not None:
+        found.datum = meaning.datum
 
 
-def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
-    errors, unsaid = [], []
-    # A column that --map reads alone has the meaning that the map gives it, and no second one.
-    mapped = {names[0] for tree in found.expressions.values() if len(names := column_names(tree)) == 1}
-    placed = {"lat", "lon"} <= set(options.map)
-    for column in sorted(columns, key=lambda column: split_header(column)[0] in PROGRAM_WORDS):
-        meaning = header_meaning(column)
-        if meaning is None or meaning.target in found.expressions or column in mapped:
-            continue
-        if placed and meaning.target in POSITION_TARGETS:
-            continue
-        if meaning.target == "id":
-            if "id" not in options.map:
-                found.ids.append(column)
-                found.id = found.id or column
-            continue
-        if meaning.target in options.map:
-            continue
-        try:
-            scale = column_factor(meaning.target, meaning.unit, f"{found.where}: column {column}", options)
-        except RecordingError as error:
-            errors.append(str(error))
-            continue
-        found.expressions[meaning.target] = parse_expression(repr(column), meaning.target)
-        found.factors[meaning.target] = meaning.sign * scale
-        found.user_labels[meaning.target] = column
-        found.datum = meaning.datum or found.datum
-        found.unitless += [meaning.target] if _unitless(meaning.target, meaning.unit, options) else []
-        if meaning.target in POSITION_TARGETS and not meaning.unit and not options.unit:
-            unsaid.append(column)
-    if {"lat", "lon", "alt", "z"} <= set(found.expressions) and "z" not in options.map and "x" not in found.expressions:
-        unsaid = [
-            column for column in unsaid if column != found.user_labels["z"]
-        ]  # such as U, used, of ArduPilot's GPS
-        _drop(found, "z")
-    if errors:
-        raise RecordingError("\n".join(errors))
+def _recognised(found: ColumnLayout, column: str, options: ImportOptions) -> None:
+    """Read a column as its header says, unless its target is read already."""
+    meaning = header_meaning(column)
+    if meaning is None or meaning.target in found.sources:
+        return
+    target, unit = meaning.target, meaning.unit
+    if target == "id" and "id" not in options.map:
+        found.ids.append(column)
+        found.id = found.id or column
+    if target in {"id", *options.map} or (target in POSITION_TARGETS and {"lat", "lon"} <= set(options.map)):
+        return
+    factor = meaning.sign * column_factor(target, unit, f"{found.where}: column {column}", options)
+    tree = parse_expression(repr(column), target)
+    found.sources[target] = Source(tree, factor, column, _is_bare(target, unit, options))
+    found.datum = meaning.datum or found.datum
+
+
+def _note_bare_lengths(
+    found: ColumnLayout, columns: Sequence[str], mapped: Collection[str], options: ImportOptions
+) -> None:
+    """Note that positions without a unit are taken as metres; raise RecordingError where they come from a camera."""
+    if {"lat", "lon", "alt", "z"} <= set(found.sources) and "z" not in options.map and "x" not in found.sources:
+        del found.sources["z"]  # such as U, used, of ArduPilot's GPS
+    bare = [source.label for target, source in found.sources.items()
+            if target in POSITION_TARGETS and source.bare and source.label not in mapped]  # fmt: skip
+    if not bare:
+        return
     # Lengths without a unit are metres in logs of robots, but pixels in files of trackers and
     # cameras: there they are refused.
-    if unsaid:
-        hints = [f"{c} comes from a tracker" for c in columns if split_header(c)[0].split("_")[-1] in OF_A_TRACKER]
-        if "t" not in found.expressions and "frame" in found.expressions:
-            hints.append(f"{found.user_labels['frame']} comes from a camera")
-        if hints:
-            raise RecordingError(f"{found.where}: column {unsaid[0]} has no unit, and {hints[0]}; {UNIT_HINT}")
-        found.notes.append(
-            f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; if not, write for instance --unit mm"
-        )
+    hints = [f"{c} comes from a tracker" for c in columns if split_header(c)[0].split("_")[-1] in OF_A_TRACKER]
+    if "t" not in found.sources and "frame" in found.sources:
+        hints.append(f"{found.sources['frame'].label} comes from a camera")
+    if hints:
+        raise RecordingError(f"{found.where}: column {bare[0]} has no unit, and {hints[0]}; {UNIT_HINT}")
+    found.notes.append(
+        f"{found.where}: {', '.join(bare)} without a unit: taken as m; if not, write for instance --unit mm"
+    )
 
 
-def _unitless(target: str, unit: str, options: ImportOptions) -> bool:
+def _is_bare(target: str, unit: str, options: ImportOptions) -> bool:
     """Return True if neither the header nor an option names the unit of a time or a position."""
     named = options.time_unit if target in ("t", "utc") else options.unit
     return target in ("t", "utc", *POSITION_TARGETS) and not unit and not named
@@ -535,42 +553,38 @@ def _unitless(target: str, unit: str, options: ImportOptions) -> bool:
 
 def _frames(found: ColumnLayout, options: ImportOptions, errors: list[str]) -> None:
     """Use frame numbers as time where there is no other time."""
-    counted = options.time_unit == "frames" and "t" in found.expressions
-    if "t" not in found.expressions and "frame" in found.expressions:
-        _copy(found, "frame", "t")
-        counted = True
+    frame = found.sources.pop("frame", None)
+    counted = options.time_unit == "frames" and "t" in found.sources
+    if "t" not in found.sources and frame is not None:
+        found.sources["t"], counted = frame, True
     if counted:
         with collect_errors(errors):
-            found.factors["t"] = frame_length(f"{found.where}: column {found.user_labels['t']}", options)
-        found.unitless = [target for target in found.unitless if target != "t"]
-    _drop(found, "frame")
+            length = frame_length(f"{found.where}: column {found.sources['t'].label}", options)
+            found.sources["t"] = found.sources["t"]._replace(factor=length, bare=False)
 
 
 def _complete(found: ColumnLayout, columns: Sequence[str], errors: list[str]) -> None:
+    """Add an error for each target that is missing."""
     shown = ", ".join(list(columns)[:12]) + (", ..." if len(columns) > 12 else "")
-    if "t" not in found.expressions and "utc" not in found.expressions:
+    if not {"t", "utc"} & set(found.sources):
         errors.append(f"{found.where}: no column of times among {shown}; write for instance --map t:=COLUMN")
-    local = all(name in found.expressions for name in POSITION_TARGETS[:2])
-    geodetic = all(name in found.expressions for name in ("lat", "lon"))
-    if not (local or geodetic):
+    if not ({"x", "y"} <= set(found.sources) or {"lat", "lon"} <= set(found.sources)):
         errors.append(f"{found.where}: no position among {shown}; write for instance --map x:=COLUMN --map y:=COLUMN")
-    for part in (VELOCITY_TARGETS, COMMAND_TARGETS):
-        if sum(name in found.expressions for name in part[:2]) == 1:
-            there = next(name for name in part[:2] if name in found.expressions)
-            lacks = next(name for name in part[:2] if name not in found.expressions)
-            errors.append(
-                f"{found.where}: has {there} ({found.user_labels[there]}) but no {lacks}; --map {lacks}:=COLUMN"
-            )
+    for pair in (VELOCITY_TARGETS[:2], COMMAND_TARGETS[:2]):
+        there, lacks = ([name for name in pair if (name in found.sources) is known] for known in (True, False))
+        if there and lacks:
+            label = found.sources[there[0]].label
+            errors.append(f"{found.where}: has {there[0]} ({label}) but no {lacks[0]}; --map {lacks[0]}:=COLUMN")
 
 
 def _note_unread(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
     """Note places that are there but not read: a depth, and latitudes beside x and y."""
     depth = next((column for column in columns if split_header(column)[0] == "depth"), "")
-    if depth and not {"z", "alt"} & set(found.expressions):
+    if depth and not {"z", "alt"} & set(found.sources):
         way = f'--map "z:=-{quote_column(depth)}"'
         found.notes.append(f"{found.where}: column {depth} is left out; for a height, write {way}")
-    if {"lat", "lon", "x", "y"} <= set(found.expressions) and "x" not in options.map:
-        x, y, lat, lon = (found.user_labels[name] for name in ("x", "y", "lat", "lon"))
+    if {"lat", "lon", "x", "y"} <= set(found.sources) and "x" not in options.map:
+        x, y, lat, lon = (found.sources[name].label for name in ("x", "y", "lat", "lon"))
         found.notes.append(
             f"{found.where}: {x}, {y} are read as positions; also there: {lat}, {lon}; for these write "
             f'--map "lat:={quote_column(lat)}" --map "lon:={quote_column(lon)}"'
@@ -579,26 +593,10 @@ def _note_unread(found: ColumnLayout, columns: Sequence[str], options: ImportOpt
 
 def _ned(found: ColumnLayout, options: ImportOptions) -> None:
     """Swap north and east and turn z over, if the user declares that x is north."""
-    if options.axes != "ned":
-        return
-    # Swapped by way of an empty name, for positions, velocities and commands.
-    for first, second, third in (POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS):
-        if {first, second, third} & set(found.expressions):
+    for first, second, third in (POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS) if options.axes == "ned" else ():
+        if {first, second, third} & set(found.sources):
             options.used.add("axes")
-        if first in found.expressions and second in found.expressions:
-            _copy(found, first, "")
-            _copy(found, second, first)
-            _copy(found, "", second)
-        if third in found.factors:
-            found.factors[third] = -found.factors[third]
-    _drop(found, "")
-
-
-def _copy(found: ColumnLayout, source: str, target: str) -> None:
-    found.expressions[target], found.factors[target] = found.expressions[source], found.factors[source]
-    found.user_labels[target] = found.user_labels[source]
-
-
-def _drop(found: ColumnLayout, target: str) -> None:
-    for table in (found.expressions, found.factors, found.user_labels):
-        table.pop(target, None)
+        if {first, second} <= set(found.sources):
+            found.sources |= {first: found.sources[second], second: found.sources[first]}
+        if third in found.sources:
+            found.sources[third] = found.sources[third]._replace(factor=-found.sources[third].factor)

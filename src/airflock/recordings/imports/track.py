@@ -11,7 +11,8 @@ from airflock.support import RecordingError
 
 POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS = ("x", "y", "z"), ("vx", "vy", "vz"), ("cx", "cy", "cz")
 GEODETIC_TARGETS = ("lat", "lon", "alt")
-TARGETS = ("t", *POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS, *GEODETIC_TARGETS, "utc", "air", "id", "frame")
+OTHER_TARGETS = ("utc", "air", "id", "receiver", "frame")
+TARGETS = ("t", *POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS, *GEODETIC_TARGETS, *OTHER_TARGETS)
 ACCEPTABLE_ERRORS = {
     "absent": "keep individuals that are there for less than a fifth of the time",
     "axes": "keep axes, signs and units although velocities contradict them",
@@ -66,11 +67,13 @@ class RowFlag(NamedTuple):
     """Meaning of a column that says which rows count: those of `least` or more, also where `sign` times it is meant.
 
     words : of rows that do not count; `receiver` and `used` name receivers or filters of one drone, of which one counts
+    numbers : of receivers that have names, by name
     """
 
     words: str
     least: float = 1.0
     sign: float = 1.0
+    numbers: dict[str, int] = {}  # noqa: RUF012
 
 
 @dataclass
@@ -88,7 +91,7 @@ class ImportedTrack:
     datum   : what heights are above: "", "amsl", "ellipsoid" or "home"
     origin  : latitude, longitude (degrees) and height (m) of x = y = z = 0, if known
     fixed_units : whether its units are those of an autopilot, which nobody chooses
-    unitless: whether nobody has named the unit of x and y
+    unnamed : targets whose unit nobody has named
     ground  : whether its axes are known to point east and north
     air     : (row,) whether it was in the air; None if the file does not tell
     breaks  : rows at which the estimator was reset, so that positions before and after do not belong together
@@ -107,7 +110,7 @@ class ImportedTrack:
     origin: tuple[float, float, float] | None = None
     fixed_units: bool = False
     ground: bool = False
-    unitless: bool = False
+    unnamed: frozenset[str] = frozenset()
     in_air: NDArray[np.bool_] | None = None
     breaks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     flags: dict[str, tuple["RowFlag", NDArray[np.float64]]] = field(default_factory=dict)

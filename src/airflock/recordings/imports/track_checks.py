@@ -1,5 +1,6 @@
 """Check tracks: missing rows, presence, names, times, heights, axes against velocities, and jumps."""
 
+import itertools
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -65,6 +66,9 @@ def _reject(source: str, column: str, own: list[ImportedTrack], counts: list[Any
     values = [track.flags[column][1] for track in own]
     known = np.concatenate(values)
     known = known[np.isfinite(known)]
+    if flag.least == 0.6 and len(known) and known.min() >= 0.0 and 50.0 < known.max() <= 100.0:
+        findings.notes.append(f"{where}, row {own[0].rows[0]} on: taken as per cent")
+        values, known = [0.01 * each for each in values], 0.01 * known
     # Types of fixes end at 8 in MAVLink and NMEA: more are a number of the fix.
     most, name = {0.6: (1.0, "likelihood"), 2.0: (8.0, "type of fix")}.get(flag.least, (np.inf, ""))
     if name and len(known) and not (known.min() >= 0.0 and known.max() <= most):
@@ -95,10 +99,11 @@ def _choose_receiver(track: ImportedTrack, counts: NDArray[np.bool_], findings: 
         best = int(np.argmax(share)) if any(share) else int(np.argmax(rows > 0.5 * rows.max()))
         other = track.rows[counts & (values != numbers[best])]
         reason = "which the autopilot used" if any(share) else "the first"
+        name = next((name for name, k in flag.numbers.items() if k == numbers[best]), f"{numbers[best]:g}")
         findings.notes.append(
-            f"{track.source}: column {column}: {track.name} has {len(numbers)} receivers or filters: "
-            f"{numbers[best]:g} is read, {reason}; {len(other)} rows of others left out, first row {other.min()}; "
-            "to read another one, take the rows of this one out of the file"
+            f"{track.source}: column {column}: {track.name} has {len(numbers)} receivers or filters: {name} is read, "
+            f"{reason}; {len(other)} rows of others left out, first row {other.min()}; to read another one, take the "
+            "rows of this one out of the file"
         )
         counts &= values == numbers[best]
 
@@ -207,6 +212,10 @@ def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) 
 
 
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
+SEVERAL = (
+    "two individuals under one id? Map another column: --map id:=COLUMN; or --map receiver:=COLUMN if it parts "
+    "receivers of one drone"
+)
 SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
 SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain
 LEAST = 0.2  # share of the common span below which an individual is worth a question
@@ -227,8 +236,6 @@ def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
         wrong = [line for line in map(_wrong_step, own) if line]
         if wrong:
             findings.add_error(wrong[0], "time")
-        else:
-            findings.notes += [line for line in map(_unsaid_step, own) if line][:1]
 
 
 def _sorted(track: ImportedTrack) -> NDArray[np.int64]:
@@ -260,23 +267,6 @@ def _wrong_step(track: ImportedTrack) -> str:
     return ""
 
 
-def _unsaid_step(track: ImportedTrack) -> str:
-    """Return the error of times without a unit that would be far apart in seconds; empty if there is none."""
-    step, name = median_period(track), track.user_labels.get("t", "")
-    if (
-        not name.isidentifier()
-        or split_header(name)[1]
-        or step < SLOW
-        or track.time[0] >= SINCE_1970
-        or track.has(VELOCITY_TARGETS)
-    ):
-        return ""
-    return (
-        f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart; if it does not count seconds, "
-        "write for instance --time-unit ms or us"
-    )
-
-
 def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> None:
     """Check rows with the time of the row before: the same row again, or another individual. Keep the first."""
     again: list[tuple[ImportedTrack, NDArray[np.int64]]] = []
@@ -292,8 +282,7 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
         if len(other) > 0.5 * len(same):
             findings.add_error(
                 f"{source}: column {track.label('t')}: {track.name} is at two places at once, first row "
-                f"{track.rows[same[other[0]] + 1]} ({apart[other[0]]:.3g} m apart): two individuals under one id; "
-                "map another column: --map id:=COLUMN",
+                f"{track.rows[same[other[0]] + 1]} ({apart[other[0]]:.3g} m apart): {SEVERAL}",
                 "duplicates",
             )
         else:
@@ -634,6 +623,7 @@ def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
 # A single step from rest to rest that needs more is no motion: a pike's fast start (Harper & Blake 1990:
 # 245 m/s^2) and a peregrine's stoop (Tucker 1998: 88 m/s) are the hardest and the fastest that we know of.
 HARDEST, FASTEST = 250.0, 100.0  # m/s^2, m/s
+RIVALS = 5.0  # times the noise of a step, beyond which two that exchange places have exchanged identities
 LONE = 0.6  # share of a jump that the steps beside it leave unexplained; a burst decays over several
 
 
@@ -642,7 +632,7 @@ class Step(NamedTuple):
 
     row  : after it, in the track; number : of that row in the file; time : of that row, s
     size : what is not explained, m; meant, place : (2,) where the track should be after it, and is, m
-    kind : "jump"; "motion" where a living thing could move so; "gap" where rows are missing in between
+    kind : "jump"; "motion" where a living thing could move so; "gap" where rows are missing in between; "small"
     """
 
     row: int
@@ -657,18 +647,11 @@ class Step(NamedTuple):
 def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Rules 5 and 6: leave out rows off a track and stays of the absent; split a track that continues elsewhere."""
     steps = [_unexplained_steps(track, findings) for track in tracks]
-    every = sorted(((step.time, who, step) for who, own in enumerate(steps) for step in own), key=lambda one: one[:2])
-    times = np.array([time for time, _, _ in every])
+    rivals = _rivals(tracks, steps)
     for who, (track, own) in enumerate(zip(tracks, steps, strict=True)):
-        rivals: dict[int, str] = {}  # row → who should be there
-        late = 0.1 * median_period(track)
-        for step in own:
-            # Identities are exchanged where another one, who jumps away at that instant, should be.
-            near = every[slice(*np.searchsorted(times, [step.time - late, step.time + late]))]
-            others = [n for _, n, old in near if np.linalg.norm(step.place - old.meant) < 0.3 * step.size and n != who]
-            rivals |= {step.row: tracks[others[0]].name} if others else {}
-        jumps = [step for step in own if step.row in rivals or step.kind == "jump"]
-        motion = [step for step in own if step.row not in rivals and step.kind == "motion"]
+        others = [rivals[who, step.row] for step in own if (who, step.row) in rivals]
+        jumps = [step for step in own if (who, step.row) in rivals or step.kind == "jump"]
+        motion = [step for step in own if (who, step.row) not in rivals and step.kind == "motion"]
         reason = "than its velocity explains" if track.has(VELOCITY_TARGETS) else "than the steps beside it explain"
         where = f"{track.source}: column {track.label('x')}, row"
         if motion:
@@ -678,8 +661,7 @@ def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
                 "cut before or after it with --end or --begin"
             )
         if jumps:
-            name = next(iter(rivals.values()), "")
-            cause = f"to where {name} should be: identities exchanged" if name else "a reset of the estimator"
+            cause = f"to where {others[0]} should be: identities exchanged" if others else "a reset of the estimator"
             findings.add_error(
                 f"{where} {jumps[0].number}: {track.name} jumps {jumps[0].size:.3g} m more {reason} ({len(jumps)} "
                 f"times): {cause}; cut before or after it with --end or --begin; if accepted, the track is split there",
@@ -688,18 +670,40 @@ def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
             track.breaks = np.union1d(track.breaks, [step.row for step in jumps]).astype(np.int64)
 
 
+def _rivals(tracks: list[ImportedTrack], steps: list[list[Step]]) -> dict[tuple[int, int], str]:
+    """Return individual and row → name of the one who should be there, of identities that are exchanged.
+
+    Chance may bring one individual to where another one should be, but not both at an instant: such steps are told from
+    motion by the noise alone, however near the two are.
+    """
+    late = 0.1 * min((median_period(track) for track in tracks), default=0.0)
+    every = sorted(((step.time, who, step) for who, own in enumerate(steps) for step in own), key=lambda one: one[:2])
+    times = np.array([time for time, _, _ in every])
+    found: dict[tuple[int, int], tuple[int, int]] = {}
+    for edges in itertools.pairwise([0, *(np.flatnonzero(np.diff(times) > late) + 1), len(every)]):
+        group = every[slice(*edges)]
+        for _, who, step in group if len(group) > 1 else ():
+            apart = [np.linalg.norm(step.place - other.meant) + 1e9 * (n == who) for _, n, other in group]
+            if min(apart) < 0.3 * step.size:
+                _, n, other = group[int(np.argmin(apart))]
+                found[who, step.row] = (n, other.row)
+    return {own: tracks[other[0]].name for own, other in found.items() if other in found}
+
+
 def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Step]:
     """Return the steps that a track's motion does not explain, after rows off the track and stays are left out."""
     outliers: list[int] = []
     while True:
-        error, limit = prediction_errors(track)
+        error, noise, lone = prediction_errors(track)
         if not len(error):
             return []
         place, steps = track.stack(POSITION_TARGETS, 2), np.diff(track.time)
         moved, size = np.diff(place, axis=0), np.linalg.norm(error, axis=1)
-        usual = steps <= 1.5 * median_period(track)
-        jumps = np.setdiff1d(np.flatnonzero(size > limit), track.breaks - 1)
+        usual, logged = steps <= 1.5 * median_period(track), track.has(VELOCITY_TARGETS)
+        limit = (SIGMAS if logged else WILD) * noise
+        jumps = np.setdiff1d(np.flatnonzero((size > limit) & lone), track.breaks - 1)
         jumps = jumps[_beyond_velocities(track, jumps, size - limit, steps)]
+        alive = np.zeros(len(size)) if logged else _alive(moved, steps)
         off = _absent_rows(place, jumps)
         if off.size:
             at = ", ".join(f"{axis:g}" for axis in place[off[0]])
@@ -711,8 +715,11 @@ def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Ste
             near = jumps[usual[jumps]]
             if _is_several(track, place, near, error, findings):
                 return []
-            alive = np.zeros(len(size)) if track.has(VELOCITY_TARGETS) else _alive(moved, steps)
-            off = _outliers(near, error if track.has(VELOCITY_TARGETS) else moved, alive)
+            off = _outliers(near, error if logged else moved, alive)
+            # A lone row before the first jump or behind the last one has no neighbour that agrees with it.
+            last = len(size) - 1
+            ends = [row for k, row in ((0, 0), (last, last + 1)) if k in jumps and not alive[k]]
+            off = off if off.size else np.array(ends, np.int64)
             outliers += track.rows[off].tolist()
         if not off.size:
             break
@@ -725,14 +732,15 @@ def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Ste
         np.linalg.norm(moved, axis=1) / steps, initial=0.0, where=np.isin(np.arange(len(steps)), jumps, invert=True)
     )
     unexplained = []
-    for k in jumps:
+    # Steps within the limit count only where two individuals exchange their places (`_rivals`).
+    small = np.setdiff1d(np.flatnonzero(size > RIVALS * noise), track.breaks - 1)
+    for k in np.union1d(jumps, small).tolist():
         # Who moves nearly as fast elsewhere may do so once more; and in a gap a logged velocity may have changed.
-        flown = not usual[k] if track.has(VELOCITY_TARGETS) else alive[k] or size[k] < 2.0 * own * steps[k]
+        flown = not usual[k] if logged else alive[k] or size[k] < 2.0 * own * steps[k]
         kind = "jump" if not flown else "motion" if usual[k] else "gap"
-        row, here = int(k) + 1, place[k + 1]
-        unexplained.append(
-            Step(row, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind)
-        )
+        row, here = k + 1, place[k + 1]
+        step = Step(row, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind)
+        unexplained.append(step if k in jumps else step._replace(kind="small"))
     return unexplained
 
 
@@ -752,7 +760,7 @@ def _is_several(track: ImportedTrack, place: Array, jumps: Any, error: Array, fi
     else:
         return False
     findings.add_error(
-        f"{track.source}: {track.name} {what}: two individuals under one id? Map another column: --map id:=COLUMN",
+        f"{track.source}: {track.name} {what}: {SEVERAL}",
         "jumps",
     )
     return True
@@ -814,8 +822,8 @@ def _absent_rows(place: Array, jumps: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.array(absent, np.int64)
 
 
-def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
-    """Return the error of each predicted step (row - 1, 2), m, and how large it may be (row - 1,), m.
+def prediction_errors(track: ImportedTrack) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the error of each predicted step (row - 1, 2), m, its noise (row - 1,), m, and where it is most of a step.
 
     The logged velocity predicts a step. Without one anything between the step before and the step
     after it does: a fast start goes on, and a turn began before.
@@ -824,7 +832,8 @@ def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
     place = track.stack(POSITION_TARGETS, 2)
     moved, steps = np.diff(place, axis=0), np.diff(track.time)
     if len(moved) < 20:
-        return np.empty((0, 2)), np.empty(0)
+        return np.empty((0, 2)), np.empty(0), np.empty(0, bool)
+    lone = np.ones(len(moved), bool)
     if track.has(VELOCITY_TARGETS):
         speed = track.stack(VELOCITY_TARGETS, 2)
         error = noise = np.nan_to_num(moved - 0.5 * (speed[1:] + speed[:-1]) * steps[:, None])
@@ -835,15 +844,15 @@ def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
         change = np.concatenate([rate[1:], rate[-3:-2]]) * steps[:, None] - before
         share = np.sum((moved - before) * change, axis=1) / np.maximum(np.sum(change**2, axis=1), 1e-300)
         error = moved - before - np.clip(share, 0.0, 1.0)[:, None] * change
-        error[np.linalg.norm(error, axis=1) < LONE * np.linalg.norm(moved, axis=1)] = 0.0
+        lone = np.linalg.norm(error, axis=1) >= LONE * np.linalg.norm(moved, axis=1)
     # Rows that repeat a place, of one who is absent or of a slow camera, say nothing about noise.
     moving = (steps <= 1.5 * step) & moved.any(axis=1)
     if not moving.any():
-        return np.zeros_like(error), np.ones(len(error))
+        return np.zeros_like(error), np.ones(len(error)), lone
     # of the livelier axis: who flies along one rests in the other
     scale = 1.4826 * float(np.median(np.abs(noise[moving]), axis=0).max())
     quantum = float(np.abs(moved[moved != 0.0]).min())  # of positions that come in steps, and repeat between them
     if not track.has(VELOCITY_TARGETS) and moved.any(axis=1).mean() > 0.9:
         quantum = 0.0  # even motion, whose steps are no noise
     scale = max(scale, quantum, 0.1 * float(np.median(np.abs(moved[moving]), axis=0).max()), 1e-9)
-    return error, (SIGMAS if track.has(VELOCITY_TARGETS) else WILD) * scale * np.maximum(steps / step, 1.0)
+    return error, scale * np.maximum(steps / step, 1.0), lone
