@@ -1052,7 +1052,9 @@ def diary(request, tmp_path, monkeypatch):
         monkeypatch.syspath_prepend(folder)
         file, module = folder / "aviary" / "readers" / "diary.py", "aviary.readers.diary"
     file.write_text(READER)
+    imports.formats.cache_clear()
     yield file
+    imports.formats.cache_clear()
     for name in (module, "aviary", "aviary.readers"):
         sys.modules.pop(name, None)
 
@@ -1079,6 +1081,7 @@ def test_a_reader_in_one_file_works_at_once(diary, tmp_path, monkeypatch):
 def test_a_reader_that_cannot_be_read_is_left_out_with_its_name(diary, tmp_path):
     if diary.parent.name == "readers":
         diary.write_text("\n@reader(\n")
+        imports.formats.cache_clear()
         with pytest.warns(UserWarning, match=r"aviary: aviary\.readers: .*diary\.py.* its readers are left out"):
             known = imports.formats()
         assert "PX4 ULog" in {one.name for one in known}
