@@ -102,7 +102,10 @@ def test_another_fitness_is_named_where_it_differs_and_goes_on_only_with_resume(
         airflock.evolve(path, tmp_path / "a", trust=True, **SHORT | {"generations": 1}, seed=1, resume=True)
 
 
-@pytest.mark.parametrize(("value", "word"), [("3.0", "flat, 3"), ("0 * float('nan')", "nan, no number,")])
+@pytest.mark.parametrize(
+    ("value", "word"),
+    [("3.0", "flat, 3"), *((f"float('{word}')", "nan or inf, no finite number,") for word in ("nan", "inf", "-inf"))],
+)
 def test_a_fitness_that_tells_no_candidate_from_another_ends_the_search(tmp_path, value, word):
     """Also of small generations, of which three are too few to say so."""
     path = study_file(tmp_path, f"def mine(values):\n    return {value}\n", 'maximise = "mine"')

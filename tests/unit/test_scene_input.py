@@ -197,6 +197,24 @@ def test_a_mesh_that_hardly_fits_its_arena_is_questioned_and_a_sound_one_is_not(
             assert np.allclose(rows[:, 3:6].max(axis=0), truth[1], atol=0.01)
 
 
+@pytest.mark.parametrize("unit", [0.01, 0.001])
+def test_a_building_in_a_smaller_unit_beside_its_arena_is_asked_about_the_unit(tmp_path, seed, unit):
+    """It is no wider than some arenas, so that only its place shows the unit; map coordinates stay map coordinates."""
+    rng = random.Random(f"{seed} {unit}")
+    for number in range(10):
+        side, wide = rng.uniform(100.0, 200.0), rng.uniform(4.0, 10.0)
+        corner = [rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 0.4) * side, rng.uniform(-0.3, 0.3) * side]
+        box = np.array([[*corner, 0.0], [corner[0] + wide, corner[1] + wide, 12.0]])
+        keys = {"scene.kind": "mesh", "world.walls": "every_edge", "world.dimensions": "3", "world.side": side}
+        keys |= {"world.floor": 0.0, "agents": 4, "start.separation": 3.0, "world.ceiling": 80.0}
+        for name, bounds in (("small", box / unit), ("map", box + [rng.uniform(2e5, 8e5), rng.uniform(1e6, 9e6), 0.0])):
+            path = tmp_path / f"{name}{number}.stl"
+            trimesh.creation.box(bounds=bounds).export(path)
+            notes = "\n".join(airflock.load("vasarhelyi_2018/real_4ms", {**keys, "scene.file": str(path)}).notes)
+            asked = re.search("the unit of the file.* with .*(0.0254|0.01|0.001) it", notes)
+            assert (asked is not None) == (name == "small"), notes
+
+
 def test_an_arena_inside_a_solid_is_no_place_to_start(tmp_path, seed):
     """Of random places in a region that is shut none may look free: each would be found by drawing again."""
     rng = random.Random(seed)

@@ -97,6 +97,7 @@ def scene_notes(scenario: Scenario) -> list[str]:
 
 WIDE = 25.0  # times as wide as the arena, from which on a mesh may be in inches, centimetres or millimetres
 WIDEST = 2e4  # m; the same without an arena
+SMALLEST = 0.01  # times as wide as the arena, from which on a mesh is looked for in a smaller unit
 BELOW, UPRIGHT = 0.25, 0.2  # share of a mesh below the ground; of the same mesh stood upright
 
 
@@ -124,9 +125,19 @@ def _mesh_doubts(scenario: Scenario) -> list[str]:
     beside = [max(low[a] - end, start - high[a], 0.0) for a, (start, end) in enumerate(((west, east), (south, north)))]
     if any(beside) or low[2] > top or high[2] < floor:
         middle = ", ".join(f"{c:.4g}" for c in 0.5 * (low + high)[: scenario.dimensions])
+        # In a smaller unit the mesh may stand in the arena, at a size that a building or a tree has.
+        fit = [
+            unit for unit in (0.0254, 0.01, 1e-3)
+            if (share := unit / scene.unit) < 1.0 and share * width > SMALLEST * across and all(
+                share * low[a] < end and share * high[a] > start
+                for a, (start, end) in enumerate(((west, east), (south, north), (floor, top)))
+            )
+        ]  # fmt: skip
+        small = f"is scene.unit = {scene.unit:g} m the unit of the file? with {fit[0]:g} it does; or " if fit else ""
         notes.append(
             f"{where}: the mesh does not reach {'the arena' if plan is not None else 'where agents start'}: its middle "
-            f"is at [{middle}] m; are these map coordinates (UTM) or heights above sea level? move its origin"
+            f"is at [{middle}] m; {small}are these map coordinates (UTM) or heights above sea level? "
+            "move its origin"
         )
     # Of a mesh that lies on its side half is below the ground, and the axis that is up in truth begins near 0.
     turned = scene.up == "y" or scene.file.lower().endswith((".glb", ".gltf")) and scene.up == "standard"

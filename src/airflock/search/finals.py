@@ -107,7 +107,7 @@ def _sound_candidates(study: Study, store: FlightStore, table: pd.DataFrame, fol
         whole = whole.assign(**{EXCESS_COLUMN: candidate_excesses(study, store, whole)})
     sound = sort_by_fitness(whole, first.name, first.maximise)
     if not len(sound):
-        reason = next(iter(store.reasons()), f"{first.name} is nan, no number")
+        reason = next(iter(store.reasons()), f"{first.name} is nan or inf, no finite number")
         raise StudyError(f"{folder}: every candidate failed; the first one: {reason}")
     return sound
 

@@ -247,7 +247,8 @@ def refuse_flat(study: Study, store: FlightStore, generation: int, values: Seque
     if len(values) < FEWEST or not (generation + 1 >= EARLY or last):
         return
     if not found:
-        why = next(iter(store.reasons()), f"{name} is nan, no number, for all of {len(values)} candidates")
+        number = f"{name} is nan or inf, no finite number, for all of {len(values)} candidates"
+        why = next(iter(store.reasons()), number)
         raise StudyError(f"{study.scenario.name}: every candidate failed; the first one: {why}")
     if len(found) < FEWEST:
         return
