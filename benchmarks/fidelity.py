@@ -16,7 +16,7 @@ from scipy.stats import kendalltau
 
 from airflock.engine import score_flight, score_flights
 from airflock.runs.flight_store import CandidateBatch, FlightStore
-from airflock.runs.folder import read_toml_file
+from airflock.runs.folder import read_request
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.search.study_space import read_space
@@ -52,8 +52,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
-    scenario = build_scenario(read_toml_file(folder / "study.toml")["scenario"], str(folder))
-    space, _ = read_space(read_toml_file(folder / "study.toml")["space"], scenario)
+    scenario = build_scenario(read_request(folder, "study")["scenario"], str(folder))
+    space, _ = read_space(read_request(folder, "study")["space"], scenario)
     print("| part of the search | flights | ms | one flight and truth | means and truth | mean fitness |")
     print("|---|---|---|---|---|---|")
     for part, numbers in PARTS.items():

@@ -20,7 +20,7 @@ from cma.fitness_models import LQModel, SurrogatePopulation, kendall_tau
 
 from airflock.engine import score_flights
 from airflock.runs.flight_store import CandidateBatch, FlightStore
-from airflock.runs.folder import read_toml_file
+from airflock.runs.folder import read_request
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.optimisers import CMAES
@@ -126,8 +126,8 @@ def halves(losses):
 
 def flown(folder, points, flights):
     """Mean loss of fresh flights of candidates at these points."""
-    scenario = build_scenario(read_toml_file(folder / "study.toml")["scenario"], str(folder))
-    space, _ = read_space(read_toml_file(folder / "study.toml")["space"], scenario)
+    scenario = build_scenario(read_request(folder, "study")["scenario"], str(folder))
+    space, _ = read_space(read_request(folder, "study")["space"], scenario)
     candidates = [with_parameters(scenario, space.parameters(point)) for point in points]
     seeds = [FIRST + i for i in range(flights)]
     rows = score_flights([s for s in candidates for _ in seeds], seeds * len(candidates), threads=1)

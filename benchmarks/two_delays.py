@@ -38,7 +38,7 @@ def studies(search):
 
 def evolved(folder, study):
     """Parameters of a study's winner; a study that was cut off is continued."""
-    open_folder(folder, study, resume=(folder / "study.toml").is_file())
+    open_folder(folder, study)
     return run_study(study, folder, study_executor(study, threads=1)).parameters
 
 

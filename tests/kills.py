@@ -18,17 +18,17 @@ import sqlite3
 import sys
 import time
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 
 import toys
 from airflock.runs.executors import ThreadExecutor
-from airflock.runs.flight_store import FILE, FlightStore
-from airflock.runs.folder import STUDY_FILE, open_folder, program_versions, remove_unfinished
-from airflock.search.finals import conclude_study
-from airflock.search.generations import run_search
+from airflock.runs.flight_store import FILE
+from airflock.runs.folder import REQUEST_FILE, open_folder
+from airflock.search.evolution import run_study
 from airflock.support import atomic
 
-RUN, NAMED = program_versions(), ("result.toml", "best.toml", "study.toml")
+NAMED = ("result.toml", "best.toml", REQUEST_FILE)
 CANDIDATES = "SELECT * FROM candidate"
 FLIGHTS = "SELECT stage, run, generation, candidate, repeat, seed, scores, reason FROM flight"
 MINE = {
@@ -40,13 +40,9 @@ MINE = {
 def evolve(folder):
     """A study of toy flights."""
     study = toys.study(generations=12, seeds=2, restarts=1)
-    open_folder(folder, study, resume=(folder / STUDY_FILE).exists())
-    executor = ThreadExecutor(toys.slow_bowl, 2)
-    with FlightStore(folder) as store:
-        store.begin(RUN)
-        remove_unfinished(folder)
-        conclude_study(study, store, executor, run_search(study, store, executor), folder)
-    executor.close()
+    import_module("airflock.search.evolution").draw_study = lambda *_: None
+    open_folder(folder, study)
+    run_study(study, folder, ThreadExecutor(toys.slow_bowl, 2))
 
 
 def of_study(folder):
@@ -61,7 +57,7 @@ def rows(folder):
 
 def certify(folder):
     """A campaign of toy flights, so many in all, and its certificate."""
-    from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
+    from airflock.certificates.campaign import Campaign
     from airflock.certificates.certification import run_campaign
     from airflock.certificates.limits import parse_limits
     from airflock.scenarios.files import load
@@ -74,7 +70,7 @@ def certify(folder):
         chance = random.Random(own)
         return {"r_min": 0.5 if chance.random() < 0.005 else 5.0, "phi_vel": 6.0 + chance.gauss(0.0, 0.4)}
 
-    open_folder(folder, campaign, resume=(folder / f"{CAMPAIGN_KIND}.toml").is_file(), kind=CAMPAIGN_KIND)
+    open_folder(folder, campaign)
     executor = ThreadExecutor(dice, 2)
     try:
         run_campaign(campaign, folder, executor, 60.0).save(folder / "certificate.toml")
@@ -89,8 +85,6 @@ def of_certificate(folder):
 
 def tune(folder):
     """A tuning of real flights, tiny ones, but for its pictures."""
-    from importlib import import_module
-
     from airflock.scenarios import build_scenario
 
     tuning = import_module("airflock.search.tuning_run")
@@ -269,7 +263,6 @@ def under_deaths(what, folder, kills, seed, life):
 def workers(folder, kills, seed):
     """Kill workers of dask under studies until so many have died."""
     from airflock.runs.dask_cluster import DaskCluster
-    from airflock.search.evolution import run_study
 
     best, space = dict(toys.BEST), toys.SPACE
 
@@ -314,7 +307,7 @@ def sweeps(folder, kills, seed):
 
 def certificates(folder, kills, seed):
     """Kill workers of dask under campaigns of real flights until so many have died."""
-    from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign, CampaignTask
+    from airflock.certificates.campaign import Campaign, CampaignTask
     from airflock.certificates.certification import run_campaign
     from airflock.certificates.limits import parse_limits
     from airflock.runs.dask_cluster import DaskCluster
@@ -328,7 +321,7 @@ def certificates(folder, kills, seed):
     def ended(name, executor):
         place = folder / name
         shutil.rmtree(place, ignore_errors=True)
-        open_folder(place, campaign, resume=False, kind=CAMPAIGN_KIND)
+        open_folder(place, campaign, resume=False)
         try:
             run_campaign(campaign, place, executor, 600.0, is_stored=False).save(place / "certificate.toml")
         finally:

@@ -11,11 +11,8 @@ import pytest
 
 import toys
 from airflock.certificates.campaign import (
-    CAMPAIGN_KIND,
     Campaign,
     CampaignTask,
-    limit_score_function,
-    with_distance_metrics,
 )
 from airflock.certificates.certification import run_campaign as certified
 from airflock.certificates.limits import parse_limits
@@ -179,11 +176,11 @@ def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_p
         near = chance.Random(own).random() < 0.01
         return {"r_min": 0.5, "closest": 0.4, "first": [3.0]} if near else {"r_min": 5.0}, "", 0.0, "worker"
 
-    open_folder(tmp_path / "here", campaign, resume=False, kind=CAMPAIGN_KIND)
+    open_folder(tmp_path / "here", campaign, resume=False)
     wanted = certified(
         campaign, tmp_path / "here", ThreadExecutor(lambda p, own: task(p, own)[0], 4), 600.0, is_stored=False
     )
-    open_folder(tmp_path / "there", campaign, resume=False, kind=CAMPAIGN_KIND)
+    open_folder(tmp_path / "there", campaign, resume=False)
     executor = DaskCluster([task], doomed.scheduler_address)
     worker = random.Random(seed).choice(list(doomed.workers.values()))
     killer = threading.Timer(0.5, os.kill, (worker.pid, signal.SIGKILL))
@@ -201,7 +198,7 @@ def test_a_worker_flies_a_certificate_to_the_bits_of_one_process():
     scenario = load("vasarhelyi_2018/real_4ms", {"agents": 6, "duration": 10.0})
     limits = parse_limits(["r_min<60 at 5%", "phi_wall>0 at 5%"], scenario)
     task = pickle.loads(pickle.dumps(CampaignTask(scenario, limits, 32)))
-    score = limit_score_function(with_distance_metrics(scenario, limits), limits, 32)
+    score = CampaignTask(scenario, limits, 32).score
     for own in range(3):
         values, reason, _, _ = task({}, own)
         assert values == score({}, own) and not reason
@@ -223,7 +220,9 @@ def test_a_flight_that_goes_wrong_on_a_worker_is_one_line(cluster, monkeypatch):
             (None, f"seed {seed}: agent 0 left the finite numbers", 0.0, "worker") if seed == 3 else ({}, "", 0.0, "")
         )
 
-    monkeypatch.setattr("airflock.runs.dask_cluster.ScenarioTask", lambda scenario, precision: task)
+    monkeypatch.setattr(
+        "airflock.runs.executors.make_executor", lambda *_, scheduler, **__: DaskCluster([task], scheduler)
+    )
     with pytest.raises(FlightError, match="^seed 3: agent 0 left the finite numbers$"):
         score_scenarios([load("vicsek_1995/ordered")] * 5, range(5), scheduler=cluster.scheduler_address)
 

@@ -23,7 +23,7 @@ import numpy as np
 
 import airflock
 from airflock import __version__
-from airflock.runs.folder import STUDY_FILE
+from airflock.runs.folder import read_request
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.hardening import COST, SAFETY, SLACK, harden
@@ -64,7 +64,7 @@ def drawn(seed: int) -> Scenario:
 
 def evolved(seed: int, folder: Path) -> Scenario:
     """The optimum of a short search, which is continued where it was cut off."""
-    found = airflock.evolve(drawn(seed), folder, threads=1, resume=(folder / STUDY_FILE).is_file(), **SHORT)
+    found = airflock.evolve(drawn(seed), folder, threads=1, resume=read_request(folder, "study") is not None, **SHORT)
     if found.dead_reason:
         raise StudyError(found.dead_reason)
     return found.scenario

@@ -10,7 +10,6 @@ import tomlkit
 from typer.testing import CliRunner
 
 from airflock.certificates.campaign import (
-    CAMPAIGN_KIND,
     COUNT_PURPOSE,
     Campaign,
     certificate_seed,
@@ -52,7 +51,7 @@ def dice(p):
 
 
 def flown(asked, folder, p, *, budget=60.0, resume=False, score=None, **how):
-    open_folder(folder, asked, resume=resume, kind=CAMPAIGN_KIND)
+    open_folder(folder, asked, resume=resume)
     executor = ThreadExecutor(score or dice(p), 2)
     try:
         return run_campaign(asked, folder, executor, budget, **how)

@@ -71,7 +71,7 @@ def test_ctrl_c_ends_with_one_line_and_keeps_what_has_landed(tmp_path):
     finally:
         running.kill()
     assert running.returncode == 2 and told.count("\n") == 1, told
-    assert "flights of the search are stored in" in told and "continue with --resume" in told
+    assert "flights are stored in" in told and "continue with --resume" in told
     assert landed(tmp_path / "a") >= 50
 
 

@@ -1,6 +1,7 @@
 """One set for many scenarios: mean and worst are what they say, every seed flies everywhere, cuts change nothing."""
 
 import json
+import pickle
 import statistics
 import tomllib
 
@@ -13,15 +14,14 @@ import airflock
 import toys
 from airflock.cli.search_verbs import _optima
 from airflock.engine import score_flight, score_flights
-from airflock.runs.dask_cluster import rebuild_scenario
-from airflock.runs.executors import ThreadExecutor
+from airflock.runs.executors import BatchExecutor, ThreadExecutor
 from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import hardening as harden
-from airflock.search.evolution import BatchExecutor, run_study, study_executor, study_tasks
+from airflock.search.evolution import run_study, study_executor, study_tasks
 from airflock.search.generations import Evaluator
 from airflock.search.study import combine_scenarios, load_study, make_study
 from airflock.support.errors import ScenarioError
@@ -113,7 +113,7 @@ def test_real_flights_are_those_of_each_scenario_here_together_and_on_workers(tm
     given = study.space.parameters(points[0])
     wanted = [score_flight(with_parameters(each, given), 7)["fitness"] for each in (small, longer)]
     rows = []
-    for name, executor in (("here", study_executor(study, threads=2)), ("together", BatchExecutor(study, "cpu"))):
+    for name, executor in (("here", study_executor(study, threads=2)), ("together", BatchExecutor(study_tasks(study)))):
         (tmp_path / name).mkdir()
         with FlightStore(tmp_path / name) as store:
             evaluator = Evaluator(study, store, executor)
@@ -123,7 +123,7 @@ def test_real_flights_are_those_of_each_scenario_here_together_and_on_workers(tm
     assert rows == [[sum(wanted) / 2.0]] * 2
     shorter = [with_parameters(each, {**given, "duration": d}) for each, d in ((small, 1.0), (longer, 1.5))]
     assert half == [[sum(row["fitness"] for row in score_flights(shorter, [7, 7])) / 2.0]]
-    there = [rebuild_scenario(task.text, task.where) for task in study_tasks(study)]
+    there = [pickle.loads(pickle.dumps(task)).scenario for task in study_tasks(study)]
     assert [score_flight(with_parameters(each, given), 7)["fitness"] for each in there] == wanted
 
 

@@ -14,17 +14,16 @@ import pytest
 
 import airflock
 import toys
-from airflock.runs.executors import Flight, ThreadExecutor
+from airflock.runs.executors import BatchExecutor, Flight, ThreadExecutor
 from airflock.runs.flight_store import FILE, CandidateBatch, FlightStore
 from airflock.runs.folder import Interrupted, differences, open_folder
 from airflock.runs.search_space import with_parameters
 from airflock.search.evolution import (
-    BatchExecutor,
     check_study_device,
     evolve_request,
     run_study,
     study_from_request,
-    study_score,
+    study_tasks,
 )
 from airflock.search.study import load_study, shipped_studies
 from airflock.support.errors import ScenarioError, StudyError
@@ -112,7 +111,7 @@ def test_ctrl_c_keeps_what_has_landed_and_resume_ends_the_same(tmp_path, done):
         if progress.fresh == 100:
             raise KeyboardInterrupt
 
-    with pytest.raises(Interrupted, match=r"1\d\d flights of the search are stored in .*continue with --resume"):
+    with pytest.raises(Interrupted, match=r"1\d\d flights are stored in .*continue with --resume"):
         finished(tmp_path / "a", study, on_progress=stop)
     open_folder(tmp_path / "a", study, resume=True)
     fresh = []
@@ -167,12 +166,12 @@ def test_folders_of_other_studies_are_refused_with_what_differs(change, words):
 def test_folders_are_never_written_over(tmp_path):
     study = toys.study()
     open_folder(tmp_path / "a", study, resume=False)
-    before = (tmp_path / "a" / "study.toml").read_bytes()
+    before = (tmp_path / "a" / "request.toml").read_bytes()
     with pytest.raises(StudyError, match="already holds this study; continue it with --resume"):
         open_folder(tmp_path / "a", study, resume=False)
     with pytest.raises(StudyError, match="holds another study: search.seed = 0 there, 3 now; give another --out"):
         open_folder(tmp_path / "a", toys.study(seed=3), resume=True)
-    assert (tmp_path / "a" / "study.toml").read_bytes() == before
+    assert (tmp_path / "a" / "request.toml").read_bytes() == before
     with pytest.raises(StudyError, match="no study to resume"):
         open_folder(tmp_path / "b", study, resume=True)
     (tmp_path / "c").mkdir()
@@ -188,12 +187,16 @@ def test_a_study_goes_on_with_what_its_folder_holds(tmp_path):
     name, folder = "vasarhelyi_2018/6ms", tmp_path / "a"
     begun = study_from_request(name, first[0], search_keys=first[1], limit=first[2])
     open_folder(folder, begun, resume=False)
-    again, told = evolve_request(name, folder=folder)
-    assert again.document() == begun.document() and "agents = 5" in told and "limit = ['r_min<3 at 1%']" in told
-    open_folder(folder, again, resume=True)
+    for scenario in (name, None):
+        again, note = evolve_request(scenario, folder=folder)
+        assert again.document() == begun.document() and f"goes on with what {folder} holds" in note
+        open_folder(folder, again, resume=True)
     other, _ = evolve_request(name, {"agents": 6}, search_keys={"generations": 3}, folder=folder)
     assert other.scenario.agents == 6 and other.search.generations == 3 and other.search.seeds == 2
-    assert evolve_request(name, first[0], search_keys=first[1], limit=first[2], folder=folder)[1] == ""
+    assert (
+        evolve_request(name, first[0], search_keys=first[1], limit=first[2], folder=folder)[0].document()
+        == begun.document()
+    )
 
 
 def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):
@@ -344,10 +347,10 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
     space, flights = study.space, []
     for i in range(7):
         flights.append(Flight(i, 0, space.parameters([0.1 + 0.1 * i] * 11), 40 + i))
-    executor = ThreadExecutor(study_score(study), 2)
+    executor = ThreadExecutor(study_tasks(study)[0].score, 2)
     alone = {landed.flight.candidate_index: landed.values for landed in executor.fly(flights)}
     executor.close()
-    together = {x.flight.candidate_index: x.values for x in BatchExecutor(study, "cpu").fly(flights)}
+    together = {x.flight.candidate_index: x.values for x in BatchExecutor(study_tasks(study)).fly(flights)}
     assert together == alone
     whole = simulate.score_flights
 
@@ -357,7 +360,7 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
         return whole(scenarios, seeds, **keywords)
 
     monkeypatch.setattr("airflock.engine.score_flights", faulty)
-    landed = {x.flight.candidate_index: x for x in BatchExecutor(study, "cpu").fly(flights)}
+    landed = {x.flight.candidate_index: x for x in BatchExecutor(study_tasks(study)).fly(flights)}
     assert landed[3].values is None and landed[3].reason.startswith("seed 43")
     assert {i: x.values for i, x in landed.items() if i != 3} == {i: v for i, v in alone.items() if i != 3}
 

@@ -229,7 +229,7 @@ def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs,
     assert (
         tau == pytest.approx(0.5, rel=0.1) and found.scenario.body.tau == tau != build_scenario(MINE, "mine").body.tau
     )
-    assert tomllib.loads((tmp_path / "a" / "study" / "study.toml").read_text())["search"]["start"] == "scenario"
+    assert tomllib.loads((tmp_path / "a" / "study" / "request.toml").read_text())["search"]["start"] == "scenario"
     told = {number["key"]: number for number in found.document()["identified"]["numbers"]}
     assert told["body.tau"]["low"] < 0.5 < told["body.tau"]["high"] and "reason" in told["radio.delay"]
     page = (tmp_path / "a" / "report.html").read_text()
@@ -309,7 +309,7 @@ def test_limits_are_by_default_on_collisions_and_where_there_are_walls_on_contac
 
 def test_search_hardening_and_certificate_hold_to_the_same_limits_on_seeds_that_never_meet(done):
     found, folder = done
-    study = tomllib.loads((folder / "study" / "study.toml").read_text())
+    study = tomllib.loads((folder / "study" / "request.toml").read_text())
     assert study["limits"] == ["r_min<0.1 at 10%"] == [limit.text for limit in found.certificate.campaign.limits]
     assert found.result.limits[0]["keeps"] and found.result.limits[0]["limit"] == "r_min<0.1 at 10%"
     with FlightStore(folder / "study", write=False) as store:

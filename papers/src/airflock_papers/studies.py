@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.runs import STUDY_FILE, open_folder
+from airflock.runs import open_folder
 from airflock.search import EvolveResult, SearchProgress, load_study, run_study, study_executor
 from airflock.support import cache_folder
 from airflock_papers.flights import Flights
@@ -38,7 +38,7 @@ def evolve(
         name, settings=settings, search={"seed": number, **keys}, tables={"space": space} if space else None
     )
     place = folder_of(folder or name, number, flights.quick)
-    open_folder(place, study, resume=(place / STUDY_FILE).exists())
+    open_folder(place, study)
 
     def watch(p: SearchProgress) -> None:
         if flights.progress:

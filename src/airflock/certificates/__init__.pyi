@@ -1,6 +1,5 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
 from .campaign import (
-    CAMPAIGN_KIND as CAMPAIGN_KIND,
     Campaign as Campaign,
     campaign_from_request as campaign_from_request,
     check_confidence as check_confidence,
@@ -18,11 +17,9 @@ from .certificate import (
 )
 from .certification import (
     COUNT_BUDGET_SHARE as COUNT_BUDGET_SHARE,
-    campaign_executor as campaign_executor,
     check_map_axes as check_map_axes,
-    flight_folder as flight_folder,
-    run_campaign as run_campaign,
-    with_planned_flights as with_planned_flights,
+    fly_campaign as fly_campaign,
+    resumed_campaign as resumed_campaign,
 )
 from .counting import (
     COUNT_BATCH as COUNT_BATCH,

@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,19 +17,18 @@ from airflock.core import Quantity, declarations
 from airflock.engine import driver_text
 from airflock.parts import SENSORS
 from airflock.runs import (
+    REQUEST_FILE,
     ScenarioTask,
-    ScoreFunction,
     check_timeout,
     check_worker_device,
     declared_numbers,
     fingerprint,
     with_parameters,
 )
-from airflock.scenarios import FaultTiming, Scenario
-from airflock.support import ErrorCollector, ScenarioError, StudyError, check_precision, suggest
+from airflock.scenarios import FaultTiming, Scenario, build_scenario
+from airflock.support import ErrorCollector, ScenarioError, StudyError, as_error, check_precision, suggest
 
 LAYOUT = 1  # of the folder; raised whenever an older folder could not be continued
-CAMPAIGN_KIND = "campaign"  # campaign.toml in the folder of flights
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,8 @@ class Campaign:
     flights: int | None = None
     flies_intervals: bool = False
     device: str = "cpu"
+    kind = "campaign"
+    also: ClassVar[Mapping[str, Any]] = {}
 
     @cached_property
     def hash(self) -> str:
@@ -55,9 +57,14 @@ class Campaign:
         return scenario_identity(self.scenario)
 
     @cached_property
+    def task(self) -> "CampaignTask":
+        """How its flights are scored."""
+        return CampaignTask(self.scenario, self.limits, self.bits, self.device)
+
+    @property
     def flown(self) -> Scenario:
         """The scenario as it is measured."""
-        return with_distance_metrics(self.scenario, self.limits)
+        return self.task.flown
 
     @property
     def alpha(self) -> float:
@@ -95,7 +102,7 @@ class Campaign:
         }
 
     def document(self) -> dict[str, Any]:
-        """The campaign as plain values: what campaign.toml holds, and what a resumed campaign is compared with."""
+        """The campaign as plain values: the request in its folder, with which a resumed one is compared."""
         return {
             "layout": LAYOUT,
             "airflock": __version__,
@@ -145,6 +152,18 @@ def campaign_from_request(
     if uncertain and not campaign.number_intervals:
         errors.note(f"{scenario.name}: no number has an interval; airflock identify --uncertain writes them")
     errors.raise_errors()
+    return campaign
+
+
+def campaign_of_request(held: Mapping[str, Any], *, trust: bool = False) -> Campaign:
+    """Return the campaign that a folder holds. Raises ScenarioError or StudyError where that cannot be flown here."""
+    with as_error(REQUEST_FILE, StudyError):
+        name, flights = str(held["name"]), held.get("flights")
+        scenario = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
+        texts, bits, device = list(held["limits"]), int(held["precision"]), str(held["device"])
+        campaign = campaign_from_request(
+            scenario, texts, held["confidence"], flights, uncertain=held["uncertain"], precision=bits, device=device
+        )
     return campaign
 
 
@@ -303,33 +322,6 @@ def sampled_every_step(scenario: Scenario) -> Scenario:
     return replace(scenario, metrics=scenario.metrics.with_numbers(period=0.0, collision_period=None))
 
 
-def limit_score_function(
-    scenario: Scenario, limits: Sequence[EventLimit], precision: int, device: str = "cpu"
-) -> ScoreFunction:
-    """Return the function from parameters and a seed to scores, with `closest` (m) and `first` (s) after an event.
-
-    scenario : as `with_distance_metrics` gives it
-    """
-    from airflock.engine import fly_world, score_flight
-
-    watched = [limit for limit in limits if limit.is_timed]
-    radius = max((limit.value for limit in limits if limit.score == "r_min"), default=0.0)
-
-    def score(parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
-        flown = with_parameters(scenario, parameters) if parameters else scenario
-        if device == "cpu":
-            values = score_flight(flown, seed, precision=precision)
-        else:
-            values = flown.judged(fly_world(flown, seed, precision=precision, device=device).values)
-        found = {name: value for name, value in values.items() if isinstance(value, (int, float))}
-        near = radius > 0.0 and (found["r_min"] <= radius or found.get("n_coll", 0.0) > 0.0)
-        if near or any(limit.has_happened(found) for limit in watched):
-            found |= event_details(flown, seed, watched, precision, device)
-        return found
-
-    return score
-
-
 def event_details(
     scenario: Scenario, seed: int, limits: Sequence[EventLimit], precision: int, device: str = "cpu"
 ) -> dict[str, Any]:
@@ -353,20 +345,28 @@ def event_details(
 
 
 class CampaignTask(ScenarioTask):
-    """Task of a dask worker: the scenario as text, the limits, and how to measure."""
+    """How flights of a campaign are scored: the scenario as it is measured, and details of events."""
 
-    def __init__(self, scenario: Scenario, limits: Sequence[EventLimit], precision: int):
-        """Raises StudyError for a law that exists only in this process."""
-        super().__init__(scenario, precision)
+    def __init__(self, scenario: Scenario, limits: Sequence[EventLimit], precision: int, device: str = "cpu"):
+        super().__init__(scenario, precision, device)
         self.limits = tuple(limits)
 
-    def flown(self, scenario: Scenario) -> Scenario:
-        """Return the scenario with metrics of the distances in the limits."""
-        return with_distance_metrics(scenario, self.limits)
+    @cached_property
+    def flown(self) -> Scenario:
+        """The scenario with metrics of the distances in the limits."""
+        return with_distance_metrics(self.scenario, self.limits)
 
-    def score_function(self, scenario: Scenario) -> ScoreFunction:
-        """Return the function from parameters and a seed to the scores of the limits."""
-        return limit_score_function(scenario, self.limits, self.precision)
+    def score(self, parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
+        """Return the scores of a flight, with `closest` (m) and `first` (s) after an event."""
+        watched = [limit for limit in self.limits if limit.is_timed]
+        radius = max((limit.value for limit in self.limits if limit.score == "r_min"), default=0.0)
+        values = super().score(parameters, seed)
+        found = {name: value for name, value in values.items() if isinstance(value, (int, float))}
+        near = radius > 0.0 and (found["r_min"] <= radius or found.get("n_coll", 0.0) > 0.0)
+        if near or any(limit.has_happened(found) for limit in watched):
+            flown = with_parameters(self.flown, parameters) if parameters else self.flown
+            found |= event_details(flown, seed, watched, self.precision, self.device)
+        return found
 
 
 # Beyond all seeds of studies and of people: no flight of a certificate has chosen anything.

@@ -14,7 +14,7 @@ from typing import Any
 from scipy.stats import binomtest
 
 from airflock import __version__
-from airflock.certificates.campaign import COUNT_PURPOSE, Campaign, certificate_seed, limit_score_function
+from airflock.certificates.campaign import COUNT_PURPOSE, Campaign, certificate_seed
 from airflock.certificates.counting import LimitVerdict, looks_due
 from airflock.certificates.limits import EventLimit, parse_limits, rate_per_hour, take_look
 from airflock.runs import program_versions, to_toml_values, write_toml_file
@@ -545,19 +545,17 @@ def _fixed(
 def _flown_again(
     document: Mapping[str, Any], campaign: Campaign, threads: int | None, done: Callable[[], None] | None
 ) -> list[str]:
-    from airflock.engine import compile_for
     from airflock.support import run_in_threads
 
     # One flight in `every` is enough: a certificate of other bits fails in nearly all of them.
     wanted, every = document["check"]["digests"], int(document["check"]["every"])
     numbers = [every * i for i in range(len(wanted))]
-    score = limit_score_function(campaign.flown, campaign.limits, campaign.bits, campaign.device)
     if campaign.device == "cpu" and numbers:
-        compile_for(campaign.flown, precision=campaign.bits)
+        campaign.task.compile()
 
     def job(number: int) -> Callable[[], str]:
         own = certificate_seed(campaign.hash, COUNT_PURPOSE, number)
-        return lambda: scores_digest(score(campaign.parameters(own), own))
+        return lambda: scores_digest(campaign.task.score(campaign.parameters(own), own))
 
     flown = run_in_threads([job(number) for number in numbers], 1 if campaign.device != "cpu" else threads, done)
     other = [number for number, now, then in zip(numbers, flown, wanted, strict=True) if now != then]

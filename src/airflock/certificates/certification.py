@@ -12,18 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from airflock.certificates.campaign import (
-    CAMPAIGN_KIND,
     FIRST_VALUE,
     MAP_PURPOSE,
     TOLERANCE_PURPOSE,
     Campaign,
-    CampaignTask,
     campaign_from_request,
+    campaign_of_request,
     certificate_seed,
     check_certify_budget,
     check_workers,
     environment_numbers,
-    limit_score_function,
     read_intervals,
     tolerance_keys,
     worse_direction,
@@ -34,18 +32,17 @@ from airflock.certificates.limits import InterimLook, alpha_share, flights_neede
 from airflock.certificates.splitting import check_split
 from airflock.core import Quantity
 from airflock.runs import (
+    RESULT_FILE,
     CandidateBatch,
-    DaskCluster,
     Executor,
     Flight,
-    FlightStore,
-    Interrupted,
-    ThreadExecutor,
     declared_numbers,
+    held_request,
+    make_executor,
     open_folder,
+    open_run,
     program_versions,
-    read_toml_file,
-    remove_unfinished,
+    read_request,
     write_toml_file,
 )
 from airflock.scenarios import Scenario, formats, scenario_variant
@@ -275,15 +272,16 @@ def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dic
     return result | {"axes": [list(values) for values in axes.values()], "cell": cells}
 
 
+BUDGET = 600.0  # s
 COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take if tolerances are requested
 
 
 def certify(
-    scenario: Scenario | str | os.PathLike[str],
-    limit: str | Sequence[str],
+    scenario: Scenario | str | os.PathLike[str] | None = None,
+    limit: str | Sequence[str] = (),
     *,
     confidence: float = 0.95,
-    budget: float = 600.0,
+    budget: float | None = None,
     flights: int | None = None,
     folder: str | os.PathLike[str] | None = None,
     resume: bool = False,
@@ -305,21 +303,21 @@ def certify(
 
     Parameters
     ----------
-    scenario : Scenario, str or path
-        What is flown.
+    scenario : Scenario, str or path, optional
+        What is flown; none to continue what a folder holds.
     limit : str or list of str
         "r_min<1 at 1e-3/h", "n_coll>=1 at 1e-2/drone-h", "clearance<0 at 1%", "phi_vel>=3 in 99%"; without a rate the
         event is bounded as well as the flights allow. All limits hold together.
     confidence : float
         Of all that is shown, in (0, 1).
-    budget : float
-        Time that may be spent, s.
+    budget : float, optional
+        Time that may be spent, s; by default 600. A campaign that is over takes more only if it is given.
     flights : int, optional
         Fly so many, whatever the time, and look once.
     folder : str or path, optional
         Folder that keeps every flight, so that what was interrupted can be continued.
     resume : bool
-        Continue the campaign in the folder.
+        Continue the campaign in the folder, which holds its scenario, limits and options.
     settings : mapping, optional
         Keys of the scenario to change.
     law : optional
@@ -367,25 +365,76 @@ def certify(
     >>> found.shown, found.verdicts[0].events
     (True, 0)
     """
-    found = scenario_variant(scenario, settings, law, trust=trust)
     errors = ErrorCollector()
-    chosen: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = errors.read(campaign_from_request, found, limit, confidence, flights, **chosen)
+    if scenario is None:
+        campaign, also = resumed_campaign(
+            folder if resume else None, trust=trust, limit=limit, flights=flights, settings=settings, law=law,
+            uncertain=uncertain, confidence=confidence != 0.95, precision=precision != 32, device=device != "cpu",
+        )  # fmt: skip
+        tolerance, split, over = tolerance or also["tolerance"], split or also["split"], over or also["map"]
+        found = campaign.scenario
+    else:
+        found = scenario_variant(scenario, settings, law, trust=trust)
+        chosen: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
+        campaign = errors.read(campaign_from_request, found, limit, confidence, flights, **chosen)
     if split:
         errors.read(check_split, campaign)
     keys = errors.read(tolerance_keys, found, tolerance)
     axes = errors.read(check_map_axes, found, over) if over else {}
-    errors.read(check_certify_budget, budget)
+    if budget is not None:
+        errors.read(check_certify_budget, budget)
     errors.read(check_workers, timeout, scheduler, device)
     errors.raise_errors()
+    return fly_campaign(
+        campaign, folder, budget, watch, resume=resume, keys=keys, split=split, axes=axes, scheduler=scheduler,
+        threads=threads, timeout=timeout,
+    )  # fmt: skip
+
+
+def resumed_campaign(
+    folder: str | os.PathLike[str] | None, *, trust: bool = False, **given: Any
+) -> tuple[Campaign, Mapping[str, Any]]:
+    """Return the campaign that a folder holds, and what is done besides: `tolerance`, `split` and `map`.
+
+    given : options that the folder holds itself, and that are refused
+    """
+    held = held_request(folder, Campaign.kind, given)
+    also = {"tolerance": [], "split": False, "map": {}, **held.get("also", {})}
+    return campaign_of_request(held, trust=trust), also
+
+
+def fly_campaign(
+    campaign: Campaign,
+    folder: str | os.PathLike[str] | None,
+    budget: float | None = None,
+    on_progress: OnCountProgress | None = None,
+    notify: Callable[[str], None] | None = None,
+    *,
+    resume: bool | None = None,
+    keys: Sequence[str] = (),
+    split: bool = False,
+    axes: Mapping[str, Sequence[float]] | None = None,
+    scheduler: str | None = None,
+    threads: int | None = None,
+    timeout: float | None = None,
+) -> Certificate:
+    """Run a campaign in a folder, or in a temporary one; begin or continue it as `airflock.runs.open_folder` does.
+
+    budget : s; None: BUDGET for one that is not over yet
+    """
+    extras = {"tolerance": list(keys), "split": split, "map": dict(axes or {})}
     with flight_folder(folder) as path:
-        executor = campaign_executor(campaign, scheduler, threads, timeout)
+        is_over = budget is None and resume is not False and (path / RESULT_FILE).is_file()
+        executor = make_executor([campaign.task], scheduler=scheduler, threads=threads, timeout=timeout)
         try:
-            campaign = with_planned_flights(campaign, executor, budget, path, resume)
-            open_folder(path, campaign, resume=resume, kind=CAMPAIGN_KIND)
+            if scheduler is None and campaign.device == "cpu" and not is_over:
+                campaign.task.compile()  # which takes none of the time for flights
+            budget = 0.0 if is_over else BUDGET if budget is None else budget
+            campaign = with_planned_flights(campaign, executor, budget, path, resume is not False)
+            open_folder(path, campaign, resume=resume, also={key: value for key, value in extras.items() if value})
             return run_campaign(
-                campaign, path, executor, budget, watch, keys=keys, split=split, axes=axes, threads=threads,
-                is_stored=folder is not None,
+                campaign, path, executor, budget, on_progress, keys=keys, split=split, axes=axes, threads=threads,
+                notify=notify, is_stored=folder is not None,
             )  # fmt: skip
         finally:
             executor.close()
@@ -416,33 +465,28 @@ def run_campaign(
     def left(share: float = 1.0) -> float:
         return share * (budget if campaign.flights else max(0.0, budget - (time.monotonic() - began)))
 
-    with FlightStore(folder) as store:
-        store.begin(program_versions())
-        remove_unfinished(folder)
+    with open_run(folder, executor, is_stored=is_stored) as store:
         write_toml_file(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
         flyer = CampaignFlyer(campaign, store, executor, note=notify)
-        try:
-            # Counting first, with its share: splitting and tolerances start from its flights.
-            part = COUNT_BUDGET_SHARE if keys or split or axes else 1.0
-            counted = count_events(flyer if campaign.flights else flyer.with_budget(budget * part), on_progress)
-            rare: Mapping[str, Any] = {}
-            tolerances: Mapping[str, Any] = {}
-            if split:
-                from airflock.certificates.splitting import estimate_by_splitting as splitting
+        # Counting first, with its share: splitting and tolerances start from its flights.
+        part = COUNT_BUDGET_SHARE if keys or split or axes else 1.0
+        counted = count_events(flyer if campaign.flights else flyer.with_budget(budget * part), on_progress)
+        rare: Mapping[str, Any] = {}
+        tolerances: Mapping[str, Any] = {}
+        if split:
+            from airflock.certificates.splitting import estimate_by_splitting as splitting
 
-                rare = splitting(flyer.with_budget(left(0.5 if keys else 1.0)), counted, threads, where)
-            if keys:
-                tolerances = find_tolerances(flyer.with_budget(left(0.5 if axes else 1.0)), counted, keys)
-            cells = map_bounds(flyer.with_budget(left()), axes) if axes else {}
-        except KeyboardInterrupt as stop:
-            done = f"interrupted: {store.count('count'):,} flights"
-            if is_stored:
-                raise Interrupted(f"{done} are stored in {folder}; continue with --resume") from stop
-            raise Interrupted(f"{done} are not kept; with --out (in Python: folder=) they are, for --resume") from stop
-    return Certificate(
+            rare = splitting(flyer.with_budget(left(0.5 if keys else 1.0)), counted, threads, where)
+        if keys:
+            tolerances = find_tolerances(flyer.with_budget(left(0.5 if axes else 1.0)), counted, keys)
+        cells = map_bounds(flyer.with_budget(left()), axes) if axes else {}
+    made = Certificate(
         campaign, tuple(counted.verdicts), event_timings(campaign, counted), counted.rows, program_versions(),
         time.monotonic() - began, counted.rate, tolerances, rare, cells, where,
     )  # fmt: skip
+    if is_stored and (budget > 0.0 or not (folder / RESULT_FILE).is_file()):
+        made.save(folder / RESULT_FILE)
+    return made
 
 
 def event_timings(campaign: Campaign, counted: CountResult) -> dict[int, EventTiming]:
@@ -468,24 +512,6 @@ def flight_folder(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
         yield Path(made)
 
 
-def campaign_executor(
-    campaign: Campaign, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
-) -> Executor:
-    """Make the executor of a campaign: threads of this process, or the workers of a dask scheduler."""
-    if scheduler is not None:
-        task = CampaignTask(campaign.scenario, campaign.limits, campaign.bits)
-        return DaskCluster([task], scheduler, timeout=timeout)
-    from airflock.engine import compile_for
-    from airflock.scenarios import uses_all_cores
-    from airflock.support import available_cores
-
-    score = limit_score_function(campaign.flown, campaign.limits, campaign.bits, campaign.device)
-    if campaign.device != "cpu":
-        return ThreadExecutor(score, 1)
-    compile_for(campaign.flown, precision=campaign.bits)
-    return ThreadExecutor(score, 1 if uses_all_cores(campaign.flown) else threads or available_cores())
-
-
 def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, folder: Path, resume: bool) -> Campaign:
     """Return the campaign with a number of flights if a limit has no rate: as many as the budget allows.
 
@@ -494,8 +520,8 @@ def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, 
     """
     if campaign.flights is not None or all(limit.rate is not None for limit in campaign.limits):
         return campaign
-    if resume and (folder / f"{CAMPAIGN_KIND}.toml").is_file():
-        known = read_toml_file(folder / f"{CAMPAIGN_KIND}.toml").get("flights")
+    if resume and (held := read_request(folder, campaign.kind)):
+        known = held.get("flights")
         return replace(campaign, flights=known if isinstance(known, int) else None)
     began = time.monotonic()
     # Seeds of their own, far behind those of tolerances: a flight that chose the number must not

@@ -16,8 +16,15 @@ from airflock.support import INVALID, PICTURES, SCENARIOS, ScenarioError, invali
 
 def evolve(
     ctx: typer.Context,
-    scenario: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file, or a study file.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the study.", show_default=False)],
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="PRESET|FILE",
+            show_default=False,
+            help="A preset, a scenario file, or a study file; none to --resume what the folder holds.",
+        ),
+    ] = None,
     algorithm: Annotated[str | None, typer.Option(help="cmaes, ga or nsga2.", show_default="cmaes")] = None,
     population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default="100")] = None,
     generations: Annotated[int | None, typer.Option(help="Generations per run.", show_default="150")] = None,
@@ -528,8 +535,12 @@ def _map(console: Any, bounds: Any) -> None:
 
 
 ScenarioArgument = Annotated[
-    str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")
-]
+    str | None,
+    typer.Argument(
+        metavar="PRESET|FILE", show_default=False,
+        help="A preset or a scenario file; with --check a certificate; none to --resume what lies beside --out.",
+    ),
+]  # fmt: skip
 Limits = Annotated[
     list[str] | None,
     typer.Option(
@@ -538,7 +549,9 @@ Limits = Annotated[
         "'phi_vel>=3 in 99%'; without a rate: bound it. Repeatable; all hold together.",
     ),
 ]  # fmt: skip
-Budget = Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 90s, 10min or 2h.")]
+Budget = Annotated[
+    str | None, typer.Option(metavar="TIME", help="Time to spend, such as 90s, 10min or 2h.", show_default="10min")
+]
 Flights = Annotated[
     int | None,
     typer.Option(help="Fly this many flights and look once, however long it takes.", show_default="from the limit"),
@@ -581,10 +594,10 @@ Device = Annotated[str, typer.Option(help="cpu, or python (not compiled, for deb
 
 def certify(
     ctx: typer.Context,
-    scenario: ScenarioArgument,
+    scenario: ScenarioArgument = None,
     limit: Limits = None,
     confidence: Annotated[float, typer.Option(help="Confidence that all limits hold together.")] = 0.95,
-    budget: Budget = "10min",
+    budget: Budget = None,
     flights: Flights = None,
     out: Out = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue with the flights beside --out.")] = False,
@@ -625,7 +638,7 @@ def certify(
         options.raise_errors(
             [f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else []
         )
-        _check(scenario, threads, trust, as_json)
+        _check(scenario or "", threads, trust, as_json)
         return
     from airflock.certificates import (
         campaign_from_request,
@@ -635,21 +648,32 @@ def certify(
         check_map_axes,
         check_split,
         check_workers,
+        fly_campaign,
+        resumed_campaign,
         tolerance_keys,
     )
     from airflock.cli.flight_verbs import parse_axis
 
-    errors.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
-    seconds = errors.read(options.parse_seconds, budget)
-    loaded = options.collect_scenario(
-        errors, scenario, options.collect_settings(errors, changes, agents, duration), law, trust=trust
-    )
-    errors.read(check_confidence, confidence)
-    errors.read(check_flight_count, flights)
-    errors.read(check_flight_options, precision, device)
+    errors.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario or ""])
+    seconds = None if budget is None else errors.read(options.parse_seconds, budget)
+    folder = None if out is None else out.parent / f"{out.stem}_flights"
+    settings = options.collect_settings(errors, changes, agents, duration)
     how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = errors.read(campaign_from_request, loaded, limit or [], confidence, flights, **how)
     also: dict[str, Any] = {"split": split, "axes": {}}
+    if scenario is None and resume and folder is not None:
+        errors.raise_errors()
+        campaign, held = resumed_campaign(
+            folder, trust=trust, limit=limit, flights=flights, settings=settings, law=law, uncertain=uncertain,
+        )  # fmt: skip
+        loaded, split = campaign.scenario, split or held["split"]
+        also = {"split": split, "axes": held["map"]}
+        tolerance_of = tolerance_of or held["tolerance"]
+    else:
+        loaded = options.collect_scenario(errors, scenario or "", settings, law, trust=trust)
+        errors.read(check_confidence, confidence)
+        errors.read(check_flight_count, flights)
+        errors.read(check_flight_options, precision, device)
+        campaign = errors.read(campaign_from_request, loaded, limit or [], confidence, flights, **how)
     also["keys"] = errors.read(tolerance_keys, loaded, tolerance_of or tolerance)
     if split:
         errors.read(check_split, campaign)
@@ -661,41 +685,12 @@ def certify(
         errors.note("--resume: name the certificate whose flights are to be continued with --out")
     errors.raise_errors()
     terminal.print_notes(campaign.scenario.notes)
-    if scheduler is None:
+    if scheduler is None and scenario is not None:
         options.compile_before_bar(campaign.flown, precision, device)
-    flying = {"scheduler": scheduler, "threads": threads, "timeout": timeout}
-    _end(_flown(campaign, seconds, out, resume, flying, also, quiet=as_json), out, plot, as_json)
-
-
-def _flown(
-    campaign: Any, seconds: float, out: Path | None, resume: bool, flying: dict[str, Any], extras: dict[str, Any], *,
-    quiet: bool,
-) -> Any:  # fmt: skip
-    """Fly a campaign, in the folder beside `out` or a temporary one, and return its certificate.
-
-    flying : scheduler, threads and timeout; also: estimates besides counting
-    """
-    from airflock.certificates import (
-        CAMPAIGN_KIND,
-        campaign_executor,
-        flight_folder,
-        run_campaign,
-        with_planned_flights,
-    )
-    from airflock.runs import open_folder
-
-    with flight_folder(None if out is None else out.parent / f"{out.stem}_flights") as folder:
-        executor = campaign_executor(campaign, **flying)
-        try:
-            campaign = with_planned_flights(campaign, executor, seconds, folder, resume)
-            open_folder(folder, campaign, resume=resume, kind=CAMPAIGN_KIND)
-            with counting_progress(quiet) as (watch, note):
-                return run_campaign(
-                    campaign, folder, executor, seconds, watch, **extras, threads=flying["threads"], notify=note,
-                    is_stored=out is not None,
-                )  # fmt: skip
-        finally:
-            executor.close()
+    also |= {"scheduler": scheduler, "threads": threads, "timeout": timeout}
+    with counting_progress(as_json) as (watch, note):
+        result = fly_campaign(campaign, folder, seconds, watch, note, resume=resume, **also)
+    _end(result, out, plot, as_json)
 
 
 def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:

@@ -1,7 +1,5 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
 from .dask_cluster import (
-    DaskCluster as DaskCluster,
-    ScenarioTask as ScenarioTask,
     check_timeout as check_timeout,
     check_worker_device as check_worker_device,
 )
@@ -9,8 +7,9 @@ from .executors import (
     Executor as Executor,
     Flight as Flight,
     FlightResult as FlightResult,
-    ScoreFunction as ScoreFunction,
+    ScenarioTask as ScenarioTask,
     ThreadExecutor as ThreadExecutor,
+    make_executor as make_executor,
     score_scenarios as score_scenarios,
 )
 from .flight_store import (
@@ -19,13 +18,16 @@ from .flight_store import (
     parse_values as parse_values,
 )
 from .folder import (
-    STUDY_FILE as STUDY_FILE,
+    REQUEST_FILE as REQUEST_FILE,
+    RESULT_FILE as RESULT_FILE,
     Interrupted as Interrupted,
     fingerprint as fingerprint,
+    held_request as held_request,
     open_folder as open_folder,
+    open_run as open_run,
     program_versions as program_versions,
+    read_request as read_request,
     read_toml_file as read_toml_file,
-    remove_unfinished as remove_unfinished,
     to_toml_values as to_toml_values,
     write_toml_file as write_toml_file,
 )

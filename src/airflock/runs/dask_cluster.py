@@ -7,19 +7,13 @@ as in one process; one that takes too long is tried again on a fresh worker proc
 recorded as failed.
 """
 
-import json
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache
-from pathlib import Path
-from threading import Lock
 from typing import Any
 
-from airflock.engine import compile_for, score_flight
-from airflock.runs.executors import Flight, FlightResult, ScoreFunction, fly_task
-from airflock.scenarios import Scenario, build_scenario
-from airflock.support import AirflockError, StudyError, processor_name
+from airflock.runs.executors import Flight, FlightResult
+from airflock.support import StudyError, processor_name
 
 ANSWER = 10.0  # s to wait for a scheduler
 AHEAD = 2  # flights per thread that are handed out at a time
@@ -27,8 +21,7 @@ RETRIES = 2  # further tries of a flight that took too long
 DESERTED = 300.0  # s without a single worker after which nobody is expected to come back
 FRESH = 15.0  # s to wait for a fresh worker process
 LOSSES = 20  # worker processes that one flight may lose before it is held to be the cause
-FlyFunction = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `Task.__call__`
-_compile_lock = Lock()  # held while a worker compiles: its threads wait for the first
+FlyFunction = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `ScenarioTask.__call__`
 
 
 def check_worker_device(scheduler: str | None, device: str) -> None:
@@ -185,43 +178,6 @@ class DaskCluster:
     def close(self) -> None:
         """Leave the scheduler; its workers are not ours to end."""
         self.client.close()
-
-
-class ScenarioTask:
-    """Task by which a worker flies one scenario: small, and picklable wherever the code of its law stands."""
-
-    def __init__(self, scenario: Scenario, precision: int):
-        """The scenario as JSON text; raises StudyError for one whose code exists only in this process."""
-        self.text, self.where, self.precision = json.dumps(scenario.document), scenario.name, precision
-        try:
-            rebuild_scenario(self.text, self.where)
-        except AirflockError as error:
-            raise StudyError(
-                f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {error}"
-            ) from error
-
-    def __call__(self, parameters: Mapping[str, float], seed: int) -> tuple[Any, str, float, str]:
-        """Fly on a worker: order parameters or None, reason, duration (s), who flew."""
-        scenario = self.flown(rebuild_scenario(self.text, self.where))
-        with _compile_lock:  # threads of a worker wait for the first to compile
-            compile_for(scenario, precision=self.precision)
-        landed = fly_task(self.score_function(scenario), Flight(0, 0, parameters, seed), worker_name())
-        return landed.values, landed.reason, landed.duration, landed.worker
-
-    def flown(self, scenario: Scenario) -> Scenario:
-        """Return the scenario whose driver flies."""
-        return scenario
-
-    def score_function(self, scenario: Scenario) -> ScoreFunction:
-        """Parameters and seed → order parameters; here no parameters are varied."""
-        return lambda _, seed: score_flight(scenario, seed, precision=self.precision)
-
-
-@lru_cache(maxsize=8)
-def rebuild_scenario(text: str, where: str) -> Scenario:
-    """Scenario from its document; made once in a worker process."""
-    # its law has run where the study began: the user who began it has consented
-    return build_scenario(json.loads(text), where, folder=Path(where).parent, trust=True)
 
 
 def worker_name() -> str:

@@ -53,8 +53,11 @@ class FlightStore:
     """Evaluations of one study folder. Use as a context; `write=False` only reads."""
 
     def __init__(self, folder: Path, *, write: bool = True):
-        """Open or create; raises StudyError where another process is writing, or where the file is no store."""
-        self.path, self.lock_handle, self.session = folder / FILE, -1, 0
+        """Open or create; `landed` counts the flights that this process has stored.
+
+        Raises StudyError where another process is writing, or where the file is no store.
+        """
+        self.path, self.lock_handle, self.session, self.landed = folder / FILE, -1, 0, 0
         if not write and not self.path.is_file():
             raise StudyError(f"{folder}: holds no study ({FILE} is missing)")
         if write:
@@ -139,6 +142,7 @@ class FlightStore:
         )
         with as_study_error(self.path):
             self.connection.execute("INSERT OR IGNORE INTO flight VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+        self.landed += 1
 
     def flown(self, batch: CandidateBatch) -> dict[tuple[int, int], Mapping[str, Any] | None]:
         """(candidate, repeat) → order parameters of the flights that the store holds, None of those that failed."""
@@ -179,10 +183,9 @@ class FlightStore:
         )
         return {str(reason): int(count) for reason, count in found}
 
-    def count(self, stage: str = "search") -> int:
-        """Flights of a stage."""
-        with as_study_error(self.path):
-            return int(self.connection.execute("SELECT count(*) FROM flight WHERE stage=?", (stage,)).fetchone()[0])
+    def count(self) -> int:
+        """Flights of all stages."""
+        return int(self.rows("SELECT count(*) FROM flight")[0][0])
 
     def rows(self, sql: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
         """All rows of a query."""

@@ -1,70 +1,147 @@
-"""The folder of a study: made or opened again, its study.toml compared before anything is written."""
+"""The folder of a run: its request, every flight as it lands, its result; begun or continued.
+
+A run is a study, a campaign of a certificate, a tuning, a hardening or a sweep. `request.toml` is written once, before
+anything flies, and compared with what a later call requests.
+"""
 
 import hashlib
 import os
 import platform
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
 from airflock import __version__
+from airflock.runs.executors import Executor
 from airflock.runs.flight_store import FlightStore
 from airflock.scenarios import Scenario
-from airflock.support import StudyError, as_error, atomic, processor_name, read_toml
+from airflock.support import StudyError, as_error, atomic, expand_path, processor_name, read_toml
 
-STUDY_FILE = "study.toml"
+REQUEST_FILE, RESULT_FILE = "request.toml", "result.toml"
+# names of the request in folders from before all runs had one format
+OLD_FILES = {"study.toml": "study", "campaign.toml": "campaign", "tune.toml": "tuning"}
+GONE: Mapping[str, Any] = {}  # keys of the search in older folders → the value at which they did nothing
 PACKAGES = ("numpy", "numba", "cma", "pymoo")
-
 FITNESS_TEXT = re.compile(r"objective\[\d+\]\.own = ")  # a difference of two studies that may go on in one folder
+OF_PROGRAM = ("layout", "airflock", "rules")  # keys that no option sets
 
 
 class Interrupted(StudyError):
     """Ctrl-C: everything that had landed is stored."""
 
 
-class HasDocument(Protocol):
-    """Work that is done in a folder and can be resumed there: a study, or a campaign of certify."""
+class Work(Protocol):
+    """Work that is done in a folder and can be resumed there."""
+
+    @property
+    def kind(self) -> str:
+        """Noun for messages: study, campaign, tuning, hardening or sweep."""
+
+    @property
+    def also(self) -> Mapping[str, Any]:
+        """What the request holds besides, which is not compared."""
 
     def document(self) -> dict[str, Any]:
         """Return everything that decides its result, as plain values."""
 
 
-def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "study") -> str:
-    """Make a study's folder, or check that it holds this very study; likewise for another kind, such as a campaign.
+def read_request(folder: Path, kind: str) -> dict[str, Any] | None:
+    """Return the request in a folder, None if it holds none. Raises StudyError for a run of another kind."""
+    for name in (REQUEST_FILE, *OLD_FILES):
+        if (folder / name).is_file():
+            held = read_toml_file(folder / name)
+            of = held.pop("run", OLD_FILES.get(name))
+            if of != kind:
+                raise StudyError(f"{folder}: holds a {of} and no {kind}; give another --out")
+            search = held.get("search", {})
+            for key, usual in GONE.items():
+                if isinstance(search, dict) and search.get(key) == usual:
+                    del search[key]
+            return held
+    return None
+
+
+def held_request(folder: str | os.PathLike[str] | None, kind: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the request of a run that is continued from its folder alone.
+
+    given : options that the folder holds itself
+    Raises StudyError for one that is given all the same, and for a folder that holds no such run.
+    """
+    held = None if folder is None else read_request(expand_path(folder), kind)
+    if held is None:
+        where = f"no scenario and no folder to resume: a {kind}" if folder is None else f"{folder}: holds no {kind}: it"
+        raise StudyError(f"{where} needs a scenario")
+    if beside := [key for key, value in given.items() if value]:
+        raise StudyError(f"{', '.join(beside)}: {folder} holds this itself; leave it out, or name the scenario, too")
+    return held
+
+
+def open_folder(folder: Path, work: Work, *, resume: bool | None = None, also: Mapping[str, Any] | None = None) -> str:
+    """Make the folder of a run, or check that it holds this very run.
+
+    resume : False refuses a folder that holds it already, True a new one; None begins or continues
+    also   : options of this call that decide what is done besides; kept in the request, but not compared
 
     A fitness of the user's own may have been mended since: flights that are stored are judged by
-    it. Returns a note of that, or "".
-
-    Raises StudyError where the folder holds another study, or this one and `resume` is False.
+    it. Returns a note of that, or "". Raises StudyError where the folder holds something else.
     """
-    found = folder / f"{kind}.toml"
-    if found.is_file():
-        held, now = read_toml_file(found), to_toml_values(study.document())
+    kind, held = work.kind, read_request(folder, work.kind)
+    if held is None and resume:
+        raise StudyError(f"{folder}: holds no {kind} to resume ({REQUEST_FILE} is missing)")
+    also = {**work.also, **(also or {})}
+    now, note, comment = to_toml_values(work.document()), "", "Written once, when it began."
+    if held is not None:
+        before = held.pop("also", {})
         changed = differences(held, now)
-        mended = resume and bool(changed) and all(FITNESS_TEXT.match(line) for line in changed)
+        mended = resume is not False and bool(changed) and all(FITNESS_TEXT.match(line) for line in changed)
         if not mended:
             same_or_refuse(folder, held, now, kind)
-        if not resume:
+        if resume is False:
             raise StudyError(f"{folder}: already holds this {kind}; continue it with --resume, or give another --out")
-        if not mended:
+        also = before | also
+        if mended:
+            with FlightStore(folder) as store:
+                store.judge_again()
+            comment = "Its fitness was changed after it had begun."
+            shown = "; ".join(changed)
+            note = f"the fitness has changed ({shown}): flights of {folder} are judged by the one of now"
+        elif to_toml_values(also) == before:
             return ""
-        with FlightStore(folder) as store:
-            store.judge_again()
-        write_toml_file(found, study.document(), f"A {kind} of Airflock. Its fitness was changed after it had begun.")
-        return f"the fitness has changed ({'; '.join(changed)}): flights of {folder} are judged by the one of now"
-    if resume:
-        raise StudyError(f"{folder}: holds no {kind} to resume ({found.name} is missing)")
     # hidden files: what a process that was killed had begun to write
-    if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
-        raise StudyError(f"{folder}: is not empty and holds no {found.name}; give a new folder")
+    elif folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
+        raise StudyError(f"{folder}: is not empty and holds no {REQUEST_FILE}; give a new folder")
+    document = {"run": kind, **now, **({"also": also} if also else {})}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_toml_file(found, study.document(), f"A {kind} of Airflock. Written once, when it began.")
+        write_toml_file(folder / REQUEST_FILE, document, f"A {kind} of Airflock. {comment}")
     except OSError as error:
         raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    return ""
+    return note
+
+
+@contextmanager
+def open_run(folder: Path, executor: Executor, *, is_stored: bool = True) -> Iterator[FlightStore]:
+    """Yield the store of a folder that `open_folder` has accepted; close the executor in the end.
+
+    is_stored : True if the folder stays
+    Raises Interrupted at Ctrl-C.
+    """
+    try:
+        with FlightStore(folder) as store:
+            store.begin(program_versions())
+            remove_unfinished(folder)
+            try:
+                yield store
+            except KeyboardInterrupt as stop:
+                done = f"interrupted: {store.count():,} flights are"
+                if is_stored:
+                    raise Interrupted(f"{done} stored in {folder}; continue with --resume") from stop
+                raise Interrupted(f"{done} not kept; with --out (in Python: folder=) they are, for --resume") from stop
+    finally:
+        executor.close()
 
 
 def remove_unfinished(folder: Path) -> None:
@@ -169,12 +246,13 @@ def _shown(value: Any, same: int) -> str:
     return f"{'...' if first else ''}{text[first : first + 54]}{'...' if len(text) > first + 54 else ''}"
 
 
-def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any], kind: str = "study") -> None:
-    """Raise StudyError, naming what differs, if a folder holds another study than the requested one."""
+def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any], kind: str) -> None:
+    """Raise StudyError, naming what differs, if a folder holds another run than the requested one."""
     found = differences(old, new)
     if not found:
         return
     shown = found[:8] + ([f"and {len(found) - 8} more"] if len(found) > 8 else [])
-    raise StudyError(
-        f"{folder}: holds another {kind}: {'; '.join(shown)}; give another --out, or ask for what it holds"
-    )
+    # Flights of other rules must not be mixed with those of now, whatever the options say.
+    other = any(line.startswith(tuple(f"{key} = " for key in OF_PROGRAM)) for line in found)
+    advice = "continue it with the version that began it" if other else "ask for what it holds"
+    raise StudyError(f"{folder}: holds another {kind}: {'; '.join(shown)}; give another --out, or {advice}")

@@ -2,8 +2,7 @@
 
 import hashlib
 import os
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,42 +10,37 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from airflock import __version__
 from airflock.core import bound_values
 from airflock.engine import plan_of
 from airflock.recordings import load_recording, replay_recording
 from airflock.runs import (
-    STUDY_FILE,
+    RESULT_FILE,
     CandidateBatch,
-    DaskCluster,
     Executor,
-    Flight,
-    FlightResult,
     FlightStore,
-    Interrupted,
     ScenarioTask,
-    ScoreFunction,
-    ThreadExecutor,
     check_timeout,
     check_worker_device,
+    held_request,
+    make_executor,
     open_folder,
-    program_versions,
-    read_toml_file,
-    remove_unfinished,
-    to_toml_values,
-    with_parameters,
+    open_run,
+    read_request,
+    write_toml_file,
 )
-from airflock.scenarios import Scenario, formats, load, scenario_variant, value_of
+from airflock.scenarios import Scenario, load, scenario_variant
 from airflock.search.finals import conclude_study
 from airflock.search.generations import Evaluator, OnSearchProgress, run_search
 from airflock.search.objectives import Objective, UserFitness
 from airflock.search.search_settings import fast_search_keys as fast_keys
-from airflock.search.study import Study, is_study, load_study, make_study
-from airflock.search.study_result import EvolveResult, draw_study
-from airflock.support import AirflockError, ErrorCollector, StudyError, atomic, expand_path
+from airflock.search.study import Study, is_study, load_study, make_study, study_of_request, study_summary
+from airflock.search.study_result import EvolveResult, draw_study, export
+from airflock.support import AirflockError, ErrorCollector, StudyError, as_error, atomic, expand_path
 
 
 def evolve(
-    scenario: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
+    scenario: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario] | None,
     out: str | os.PathLike[str],
     *,
     resume: bool = False,
@@ -70,13 +64,14 @@ def evolve(
 
     Parameters
     ----------
-    scenario : str, path, Scenario or Study, or several scenarios
+    scenario : str, path, Scenario or Study, several scenarios, or None
         A preset, a scenario or study file, a Scenario, or a Study. Of a list of presets, files and Scenarios one set
+        of numbers is searched that flies in all of them. None continues what the folder holds.
         of numbers is searched that flies in all of them.
     out : str or path
         The study's folder.
     resume : bool
-        Continue the study in the folder to the identical end. Options that are not given are as in the first call.
+        Continue the study in the folder to the identical end; nothing else has to be given but a function `fitness`.
     settings : mapping, optional
         Keys of the scenario to change, such as {"duration": 300.0}.
     space : mapping, optional
@@ -163,18 +158,6 @@ def evolve(
     return run_study(study, folder, executor, watch, sensitivity=sensitivity)
 
 
-def study_score(study: Study, scenario_index: int = 0) -> ScoreFunction:
-    """Return the function from parameters and a seed to order parameters, for one scenario of the study."""
-    from airflock.engine import score_flight
-
-    precision = int(study.search.precision)
-
-    def score(parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
-        return score_flight(with_parameters(study.scenarios[scenario_index], parameters), seed, precision=precision)
-
-    return score
-
-
 def resolve_device(study: Study, device: str) -> Study:
     """Return the study for a device: cpu, cuda, or the choice of auto for one generation. Raises if it is missing."""
     check_study_device(device)
@@ -190,20 +173,12 @@ def study_executor(
     study: Study, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
 ) -> Executor:
     """Make the executor of a study: threads of this process, or the workers of a dask scheduler."""
-    if study.device != "cpu":
-        return BatchExecutor(study, study.device)
-    if scheduler is not None:
-        return DaskCluster(study_tasks(study), scheduler, timeout=timeout)
-    from airflock.engine import compile_for
-    from airflock.scenarios import uses_all_cores
-    from airflock.support import available_cores
+    return make_executor(study_tasks(study), scheduler=scheduler, threads=threads, timeout=timeout)
 
-    # compiled once, before threads ask for it; a second processor has nothing to do until then
-    for scenario in study.scenarios:
-        compile_for(scenario, precision=int(study.search.precision))
-    alone = any(uses_all_cores(scenario) for scenario in study.scenarios)
-    scores = [study_score(study, place) for place in range(len(study.scenarios))]
-    return ThreadExecutor(scores[0], 1 if alone else threads or available_cores(), scores[1:])
+
+def study_tasks(study: Study) -> list[ScenarioTask]:
+    """Return how flights of each scenario of a study are scored."""
+    return [ScenarioTask(scenario, int(study.search.precision), study.device) for scenario in study.scenarios]
 
 
 def run_study(
@@ -215,25 +190,26 @@ def run_study(
     *,
     sensitivity: str = "",
 ) -> EvolveResult:
-    """Search and conclude in a folder that `open_folder` has accepted; close the executor."""
-    try:
-        with FlightStore(folder) as store:
-            store.begin(program_versions())
-            remove_unfinished(folder)
-            try:
-                centres = run_search(study, store, executor, on_progress)
-                result = conclude_study(study, store, executor, centres, folder, notify)
-                if sensitivity:
-                    shares = run_sensitivity(study, store, executor, method=sensitivity, on_flight=notify)
-                    atomic.write_file(folder / "sensitivity.csv", shares.to_csv(index=False))
-            except KeyboardInterrupt as stop:
-                raise Interrupted(
-                    f"interrupted: {store.count()} flights of the search are stored in {folder}; continue with --resume"
-                ) from stop
+    """Search and conclude in a folder that `open_folder` has accepted; close the executor.
+
+    sensitivity : a method, "" for that of an earlier call
+    """
+    if sensitivity:
+        open_folder(folder, study, also={"sensitivity": sensitivity})
+    sensitivity = sensitivity or (read_request(folder, study.kind) or {}).get("also", {}).get("sensitivity", "")
+    with open_run(folder, executor) as store:
+        centres = run_search(study, store, executor, on_progress)
+        result = conclude_study(study, store, executor, centres, folder, notify)
+        if sensitivity:
+            shares = run_sensitivity(study, store, executor, method=sensitivity, on_flight=notify)
+            atomic.write_file(folder / "sensitivity.csv", shares.to_csv(index=False))
+        if store.landed or not (folder / RESULT_FILE).is_file():
+            export(store, folder, study.labels)
             draw_study(study, store, result, folder)
-            return result
-    finally:
-        executor.close()
+        # last: a folder with a result is complete
+        comment = "What the study found; parameters and ranges in SI units."
+        write_toml_file(folder / RESULT_FILE, result.document(), comment)
+        return result
 
 
 def evolve_request(
@@ -244,23 +220,33 @@ def evolve_request(
     *,
     fast: bool = False,
     folder: Path | None = None,
+    fitness: UserFitness | None = None,
     **others: Any,
 ) -> tuple[Study, str]:
-    """Make a study by `study_from_request`, which takes the other arguments. Values missing in a resumed one come
-    from its folder.
+    """Make a study by `study_from_request`, which takes the other arguments; a resumed one as its folder holds it.
 
-    Returns the study and a note of the values that the folder gave.
+    scenario : None for what the folder holds
+    folder   : of a study to resume; what this call gives wins, so that `open_folder` can compare
+    Returns the study, and a note if it was read from the folder.
     """
-
-    def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
-        return study_from_request(scenario, changes, search_keys=keys, limit=limits, fast=quick, **others)
-
     limits = [limit] if isinstance(limit, str) else list(limit)
-    study = ask(settings, search_keys or {}, limits, quick=fast)
-    if folder is None or isinstance(scenario, Study):
-        return study, ""
-    keys = fast_keys(search_keys or {}, limits=bool(limits)) if fast else search_keys or {}
-    return resume_study(folder, study, settings or {}, keys, limits, ask)
+    keys = fast_keys(search_keys or {}, limits=bool(limits)) if fast else dict(search_keys or {})
+    if scenario is None:
+        beside = {key: value for key, value in others.items() if key not in ("fitness", "trust")}
+        held, given = held_request(folder, Study.kind, beside), None
+    else:
+        held = None if folder is None else read_request(folder, Study.kind)
+        given = study_from_request(scenario, settings, search_keys=keys, limit=limits, fitness=fitness, **others)
+        if held is None or isinstance(scenario, Study) or held.get("airflock") != __version__:
+            return given, ""
+    objectives = None if fitness is None else (own_objective(fitness),)
+    if given is not None and (others.get("objective") or any(objective.own for objective in given.objectives)):
+        objectives = given.objectives
+    changes: dict[str, Any] = {"settings": settings, "search": keys, "limits": limits, "objectives": objectives}
+    with as_error(folder or "", StudyError):
+        study = study_of_request(held, given, **changes, trust=bool(others.get("trust")))
+    study = replace(study, space=given.space) if given is not None and others.get("space") else study
+    return study, f"goes on with what {folder} holds: {study_summary(study)}"
 
 
 def study_from_request(
@@ -298,10 +284,12 @@ def study_from_request(
         study = make_study(tables, where, search=search_keys, scenario=scenarios, limits=limits, trust=trust)
     else:
         study = load_study(what, settings=settings, search=search_keys, tables=tables, limits=limits, trust=trust)
-    if fitness is not None:
-        name = getattr(fitness, "__name__", "fitness")
-        study = replace(study, objectives=(Objective(name, own=fitness, text=_text_of(fitness)),))
-    return study
+    return study if fitness is None else replace(study, objectives=(own_objective(fitness),))
+
+
+def own_objective(fitness: UserFitness) -> Objective:
+    """Return the aim of a function of the user's own."""
+    return Objective(getattr(fitness, "__name__", "fitness"), own=fitness, text=_text_of(fitness))
 
 
 def _text_of(fitness: Any) -> str:
@@ -327,59 +315,6 @@ def check_study_device(device: str, scheduler: str | None = None) -> None:
     check_worker_device(scheduler, device)
     if device not in ("cpu", "cuda", "auto"):
         raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
-
-
-OWN = ("layout", "airflock")  # of the version that made the folder; no option sets them
-
-
-def resume_study(
-    folder: Path,
-    study: Study,
-    settings: Mapping[str, Any],
-    search: Mapping[str, Any],
-    limit: Sequence[str],
-    make_request: Callable[[dict[str, Any], dict[str, Any], list[str]], Study],
-) -> tuple[Study, str]:
-    """Return the study as its folder holds it, and a note of the values taken from there. New requests win.
-
-    study : as it would be without the folder
-    settings, search, limit : values that this call requests
-    make_request : makes the study for other settings, keys of the search, and limits
-    """
-    if not (folder / STUDY_FILE).is_file():
-        return study, ""
-    held, now = read_toml_file(folder / STUDY_FILE), to_toml_values(study.document())
-    if any(held.get(key) != now[key] for key in OWN):
-        return study, ""  # `open_folder` says so
-    # A key may be given by its last name alone, so such keys win over the folder, too.
-    named = {key.rpartition(".")[2] for key in settings}
-    flown = {
-        key: value
-        for key, value in _changed(formats.to_current_format(held.get("scenario", {}), str(folder)), now["scenario"])
-        if key not in settings and key.rpartition(".")[2] not in named
-    }
-    keys = {key: value for key, value in held.get("search", {}).items() if key not in search}
-    searched = {f"search.{key}": value for key, value in keys.items() if now["search"].get(key) != value}
-    limits = list(limit) or list(held.get("limits", []))
-    held_to = {"limit": limits} if limits != list(limit) and limits != now.get("limits", []) else {}
-    taken = flown | searched | held_to
-    if not taken:
-        return study, ""
-    listed = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
-    said = f"goes on with what {folder} holds: {listed}"
-    return make_request({**settings, **flown}, {**keys, **search}, limits if held_to or limit else []), said
-
-
-def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> list[tuple[str, Any]]:
-    """Return the keys of a scenario whose value in the folder differs, with the value in the folder."""
-    found: list[tuple[str, Any]] = []
-    for key, value in held.items():
-        other = now.get(key)
-        if isinstance(value, Mapping) and isinstance(other, Mapping) and "value" not in value:
-            found += _changed(value, other, f"{at}{key}.")
-        elif value_of(value) != value_of(other):
-            found.append((f"{at}{key}", value))
-    return found
 
 
 class ValidationReport(NamedTuple):
@@ -501,57 +436,3 @@ def run_sensitivity(
         found = analyse_morris.analyze(problem, np.asarray(points), values, seed=seed)
         columns = ("mu_star", "mu_star_conf", "sigma")
     return pd.DataFrame({"parameter": list(study.space.keys), **{c: np.asarray(found[c], float) for c in columns}})
-
-
-class BatchExecutor:
-    """Fly a batch in one call of the engine; bisect it to find a flight with an error, and keep the others."""
-
-    def __init__(self, study: Study, device: str):
-        """`device` as `airflock.engine.score_flights` takes it."""
-        self.study, self.device = study, device
-
-    def fly(self, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
-        """Yield all flights of a scenario once they are over."""
-        for place in sorted({flight.place for flight in tasks}):
-            yield from self._fly([flight for flight in tasks if flight.place == place])
-
-    def _fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
-        from airflock.engine import score_flights
-
-        begin = time.perf_counter()
-        try:
-            scenarios = [with_parameters(self.study.scenarios[flight.place], flight.parameters) for flight in flights]
-            precision = int(self.study.search.precision)
-            rows = score_flights(scenarios, [f.seed for f in flights], precision=precision, device=self.device)
-        except (AirflockError, ArithmeticError) as error:
-            if len(flights) == 1:
-                reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-                yield FlightResult(flights[0], None, reason, time.perf_counter() - begin, self.device)
-                return
-            # One bad flight ends the whole batch. Halving finds it in log2 steps, and all others
-            # keep their result.
-            half = len(flights) // 2
-            yield from self._fly(flights[:half])
-            yield from self._fly(flights[half:])
-            return
-        each = (time.perf_counter() - begin) / len(flights)
-        for flight, values in zip(flights, rows, strict=True):
-            yield FlightResult(flight, values, "", each, self.device)
-
-    def close(self) -> None:
-        """Release nothing: this executor holds no threads."""
-
-
-class StudyTask(ScenarioTask):
-    """Task of a dask worker that flies a scenario with the parameters of a candidate."""
-
-    def score_function(self, scenario: Scenario) -> ScoreFunction:
-        """Return the function from parameters and a seed to order parameters."""
-        from airflock.engine import score_flight
-
-        return lambda p, seed: score_flight(with_parameters(scenario, p), seed, precision=self.precision)
-
-
-def study_tasks(study: Study) -> tuple[StudyTask, ...]:
-    """Make the task of each scenario. Raises StudyError for a law that exists only in this process."""
-    return tuple(StudyTask(scenario, int(study.search.precision)) for scenario in study.scenarios)

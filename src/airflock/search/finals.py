@@ -23,12 +23,10 @@ from airflock.search.optimisers import pareto_front
 from airflock.search.study import Study
 from airflock.search.study_result import (
     DURATION_COLUMN,
-    RESULT_FILE,
     EvolveResult,
     best_document,
     best_files,
     candidate_table,
-    export,
     full_length_candidates,
     mean_interval,
     sort_by_fitness,
@@ -46,7 +44,7 @@ def conclude_study(
     folder: Path,
     on_flight: Callable[[bool], None] | None = None,
 ) -> EvolveResult:
-    """Evaluate finalists, choose the winner, and write result.toml, best.toml and tables into the study's folder.
+    """Evaluate finalists, choose the winner, and write best.toml into the study's folder.
 
     centres : final mean of each run, points of the unit cube
     on_flight : called after each flight with True if it is new
@@ -90,12 +88,10 @@ def conclude_study(
         scenarios=each,
         limits=tuple(limit_reports(study, [flown[0, r] for r in range(len(unbiased) * len(study.scenarios))])),
     )
-    write_toml_file(folder / RESULT_FILE, result.document(), "What the study found; parameters and ranges in SI units.")
     if not result.dead_reason:
         for place, name in enumerate(best_files(study)):
             document = best_document(study, winner, result, folder, place)
             write_toml_file(folder / name, document, "The winner of a study, ready to fly.")
-    export(store, folder, study.labels)
     return result
 
 

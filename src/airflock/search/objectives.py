@@ -36,7 +36,7 @@ class Objective:
 
     name       : an order parameter, or the name of a function of the user's own
     maximise   : False where less is better
-    own, text  : a function of the user's own, and a hash of its text
+    own, text  : a function of the user's own, and a hash of its text; file : that holds it, if it is one
     over_seeds : mean, worst case, or the value that all but a share `quantile` of the flights reach
     """
 
@@ -46,6 +46,7 @@ class Objective:
     quantile: float = 0.1
     own: UserFitness | None = None
     text: str = ""
+    file: str = ""
 
     def of_flight(self, values: Mapping[str, Any]) -> float:
         """Value of one flight; nan where it is not finite, or where a function of the user's own fails."""
@@ -136,7 +137,7 @@ def read_objectives(
     if not isinstance(quantile, (int, float)) or isinstance(quantile, bool) or not 0.0 <= quantile <= 1.0:
         errors.append(f"objective.quantile = {quantile!r} lies outside [0, 1]")
         quantile = 0.1
-    own, text, more = _own(table.get("own"), folder, trust)
+    own, text, file, more = _own(table.get("own"), folder, trust)
     errors += more
     found = []
     for key in ("maximise", "minimise"):
@@ -146,10 +147,12 @@ def read_objectives(
             errors.append(f"objective.{key} = {named!r} is neither a name nor a list of names")
             continue
         how = (key == "maximise", str(over), float(quantile))
-        found += [Objective(n, *how, own.get(n), text if n in own else "") for n in names]
+        found += [Objective(n, *how, own.get(n), *((text, file) if n in own else ())) for n in names]
     if not found:
         name = scenario.metrics.rule.best or "fitness"
-        found = [Objective(name, True, str(over), float(quantile), own.get(name), text if name in own else "")]
+        found = [
+            Objective(name, True, str(over), float(quantile), own.get(name), *((text, file) if name in own else ()))
+        ]
     if text and not any(objective.own for objective in found):
         names = [
             name
@@ -184,19 +187,19 @@ def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[EventL
     return found, list(dict.fromkeys(errors))
 
 
-def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, UserFitness], str, list[str]]:
-    """Functions of a user's own file by name, a hash of its text, and errors."""
+def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, UserFitness], str, str, list[str]]:
+    """Functions of a user's own file by name, a hash of its text, its place, and errors."""
     if name is None:
-        return {}, "", []
+        return {}, "", "", []
     path = expand_path(str(name)) if folder is None else folder / expand_path(str(name))
     if path.suffix != ".py" or not is_file(path):
-        return {}, "", [f"objective.own = {name!r}: no such Python file"]
+        return {}, "", "", [f"objective.own = {name!r}: no such Python file"]
     try:
         text = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
         module = import_user_file(path, f"objective.own = {name!r}", trust=trust)
     except RuleError as error:
-        return {}, "", [f"objective.own: {error}"]
+        return {}, "", "", [f"objective.own: {error}"]
     except ScenarioError as error:
-        return {}, "", error.errors
+        return {}, "", "", error.errors
     own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
-    return own, text, []
+    return own, text, str(path), []

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from html import escape
@@ -11,11 +12,32 @@ from typing import Any
 from airflock import __version__
 from airflock.certificates import EventLimit
 from airflock.runs import SearchSpace, declared_numbers, fingerprint
-from airflock.scenarios import Scenario, files_of_laws, formats, html_table, load, presets, schema, tells_of_study
+from airflock.scenarios import (
+    Scenario,
+    build_scenario,
+    files_of_laws,
+    formats,
+    html_table,
+    load,
+    presets,
+    scenario_variant,
+    schema,
+    tells_of_study,
+)
 from airflock.search.objectives import Objective, read_limits, read_objectives
 from airflock.search.search_settings import CONSTANT_SEEDS_SHARE, SEED_BITS, SearchSettings, search_errors
 from airflock.search.study_space import default_space, read_space
-from airflock.support import ScenarioError, TextError, as_error, expand_path, is_file, read_toml, shortened, suggest
+from airflock.support import (
+    ScenarioError,
+    StudyError,
+    TextError,
+    as_error,
+    expand_path,
+    is_file,
+    read_toml,
+    shortened,
+    suggest,
+)
 
 KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
 LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued
@@ -41,6 +63,7 @@ class Study:
     over_scenarios: str = "mean"
     labels: tuple[str, ...] = ()
     limits: tuple[EventLimit, ...] = ()
+    kind = "study"
 
     def __repr__(self) -> str:
         return f"<{study_summary(self)}>"
@@ -76,7 +99,7 @@ class Study:
         return ((self.whole("seed") + 1) << SEED_BITS) + (purpose << (SEED_BITS - 4)) + index
 
     def document(self) -> dict[str, Any]:
-        """Return the study as plain values, for study.toml and for the comparison on resume."""
+        """Return the study as plain values, for the request in its folder and for the comparison on resume."""
         q = self.search
         return {
             "layout": LAYOUT,
@@ -105,6 +128,18 @@ class Study:
             "scenario": _unpublished(self.scenario),
             **self._several(),
         }
+
+    @property
+    def also(self) -> dict[str, Any]:
+        """Names and files by which `study_of_request` finds what the document does not hold."""
+        found: dict[str, Any] = {"scenarios": [each.name for each in self.scenarios]} if self.others else {}
+        files = [objective.file for objective in self.objectives if objective.file]
+        found |= {"own": files[0]} if files else {}
+        # A file groups keys by section, and a point is read in the order of the axes.
+        keys = [key.rpartition(".") for key in self.space.keys]
+        sections = ["", *dict.fromkeys(section for section, _, _ in keys)]
+        in_order = sorted(keys, key=lambda key: sections.index(key[0])) == keys
+        return found if in_order else found | {"order": list(self.space.keys)}
 
     def _several(self) -> dict[str, Any]:
         """Return the entries of several scenarios for the document."""
@@ -170,6 +205,45 @@ def load_study(
         return make_study(
             document, where, settings=settings, search=search, folder=path.parent, limits=limits, trust=trust
         )
+
+
+def study_of_request(
+    held: Mapping[str, Any], given: Study | None, *, settings: Mapping[str, Any] | None, search: Mapping[str, Any],
+    limits: Sequence[str], objectives: tuple[Objective, ...] | None, trust: bool,
+) -> Study:  # fmt: skip
+    """Return the study that a folder holds, with what a call that resumes it gives besides.
+
+    given      : the same study as this call names it, if it does; of use where an older folder keeps no names
+    objectives : in place of those in the folder
+    Raises ScenarioError or StudyError where that cannot be searched here.
+    """
+    also = held.get("also", {})
+    names = also.get("scenarios") or ([each.name for each in given.scenarios] if given else [held["name"]])
+    documents = [value for key, value in held.items() if re.fullmatch(r"scenario(_\d+)?", key)]
+    if names[0] != held["name"] or len(names) != len(documents):
+        raise StudyError(f"a study of {held['name']} and {len(documents) - 1} more, not of {', '.join(names)}")
+    scenarios = [
+        scenario_variant(build_scenario(document, name, folder=Path(name).parent, trust=trust), settings, trust=trust)
+        for name, document in zip(names, documents, strict=True)
+    ]
+    goals = held["objective"]
+    table: dict[str, Any] = {key: goals[0][key] for key in ("over_seeds", "quantile")}
+    table |= {"limits": held.get("limits", []), **({"own": also["own"]} if "own" in also and not objectives else {})}
+    if any("own" in goal for goal in goals) and not (objectives or "own" in also):
+        raise StudyError("its fitness is a function of your own; give it again, or name the study file that holds it")
+    for key, is_maximised in (("maximise", True), ("minimise", False)):
+        table[key] = [goal["name"] for goal in goals if goal["maximise"] is is_maximised]
+    document = {key: held[key] for key in ("title", "search", "space", "over_scenarios") if key in held}
+    where = ", ".join(names)
+    study = make_study(
+        {**document, "objective": table}, where, search=search, scenario=scenarios, limits=limits, trust=trust
+    )
+    order = also.get("order", study.space.keys)
+    axes = sorted(study.space.axes, key=lambda axis: order.index(axis.key))
+    return replace(
+        study, labels=tuple(held.get("labels", study.labels)), device=held["device"],
+        objectives=objectives or study.objectives, space=replace(study.space, axes=tuple(axes)),
+    )  # fmt: skip
 
 
 def _once(where: str, error: str) -> str:

@@ -19,7 +19,7 @@ from airflock.search.optimisers import pareto_front
 from airflock.search.study import Study
 from airflock.support import FormatError, StudyError, as_error, atomic, parse_json
 
-RESULT_FILE, BEST_FILE = "result.toml", "best.toml"
+BEST_FILE = "best.toml"
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 from airflock import __version__
 from airflock.certificates import (
-    CAMPAIGN_KIND,
     Certificate,
     CountProgress as Counted,
     campaign_executor,
@@ -279,7 +278,7 @@ def run_search_stage(
 
     objective = {"objective": {"limits": list(limits)}} if limits else {}
     study = make_study(objective, start.name, search=plan.search, scenario=start)
-    open_folder(folder / STUDY_FOLDER, study, resume=(folder / STUDY_FOLDER / "study.toml").is_file())
+    open_folder(folder / STUDY_FOLDER, study)
     return evolved(study, folder / STUDY_FOLDER, searching(study, threads=threads), searched)
 
 
@@ -339,7 +338,7 @@ def run_certificate_stage(
 
     campaign = campaign_from_request(tuned, limits, confidence)
     path = folder / "certificate_flights"
-    open_folder(path, campaign, resume=(path / f"{CAMPAIGN_KIND}.toml").is_file(), kind=CAMPAIGN_KIND)
+    open_folder(path, campaign)
     executor = campaign_executor(campaign, threads=threads)
     try:
         keys = used_and_unused_keys(tuned)
