@@ -94,7 +94,7 @@ def tune(folder):
         found.folder / "report.html", repr(found)
     )
     # the limit is shown after its first looks, whatever the time
-    resume = (folder / "tune.toml").is_file()
+    resume = (folder / REQUEST_FILE).is_file()
     tuning.tune(build_scenario(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 20%"], resume=resume)
 
 
@@ -103,9 +103,9 @@ def of_tuning(folder):
     from airflock.support.untrusted import read_toml
 
     told = read_toml(folder / "certificate.toml")
-    names = ("tune.toml", "start.toml", "tuned.toml", "hardening.json")
+    names = (REQUEST_FILE, "start.toml", "tuned.toml")
     texts = [(folder / name).read_text().replace(str(folder), "FOLDER") for name in names]
-    return rows(folder / "study"), texts, told["limit"], told["flights"]
+    return rows(folder / "study"), rows(folder / "hardening_flights"), texts, told["limit"], told["flights"]
 
 
 def tracks(folder):

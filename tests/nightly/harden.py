@@ -23,11 +23,12 @@ import numpy as np
 
 import airflock
 from airflock import __version__
+from airflock.engine import score_flights
 from airflock.runs.folder import read_request
+from airflock.runs.search_space import with_parameters
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search.hardening import COST, SAFETY, SLACK, harden
-from airflock.search.hardening_steps import ScoreColumns, fly_parameters
+from airflock.search.hardening import COST, SAFETY, SLACK, ScoreColumns, harden, score_columns
 from airflock.search.study_result import mean_interval
 from airflock.search.tuning_run import prepare_start
 from airflock.support import atomic
@@ -82,7 +83,9 @@ def judged(seed: int, folder: Path | None) -> dict[str, Any]:
     except ScenarioError as fault:
         return {**told, "refused": fault.errors[0], "held": True, "grown": False}
     fresh = range(FIRST, FIRST + JUDGED)
-    before, after = fly_parameters(scenario, [steps[0].parameters, steps[-1].parameters], fresh, 1, None)
+    flown = [score_flights([with_parameters(scenario, each.parameters)] * JUDGED, fresh, threads=1)
+             for each in (steps[0], steps[-1])]  # fmt: skip
+    before, after = (score_columns(scenario, rows) for rows in flown)
     walls = contacts(before) > float((before["n_coll"] > 0.0).mean())
     cost = float((before["fitness"] - after["fitness"]).mean())
     margin = [1.0 - contacts(table) if walls else float(table["r_min"].mean()) for table in (before, after)]

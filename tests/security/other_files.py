@@ -36,7 +36,6 @@ def sound():
         "memory": (".memory", b'{"sent": 7, "heard": {"2": 3}, "order": 1}'),
         "log": (".log", _log()),
         "plan": (".toml", b"seeds = 10\nseconds = 5.0\nrate = 100.0\nidentity = 'x'\n[search]\ngenerations = 3\n"),
-        "steps": (".json", json.dumps(_steps()).encode()),
         "mesh": (".obj", (GOLDEN.parents[1] / "cube.obj").read_bytes()),
     }
     return found | _tracks()
@@ -118,13 +117,6 @@ def _made_card():
     from airflock.drones.onboard.card import parse_card
 
     return parse_card(json.loads(sound_card()))
-
-
-def _steps():
-    step = {"name": "start", "reason": "r", "parameters": {"model.p_rep": 0.1}, "fitness": 0.5, "r_min": 3.0,
-            "n_coll": 0.0, "cost": [0.0, 0.0, 0.0], "gain": [0.0, 0.0, 0.0], "parts": {"f_coll": 1.0},
-            "contacts": 0.0, "kept": True, "verdict": "kept"}  # fmt: skip
-    return {"why": "", "steps": [step]}
 
 
 def _tracks():
@@ -213,7 +205,7 @@ def _damaged(rng, kind, content):
         document = _without_dates(mutate(rng, untrusted.parse_toml(content.decode())))
         document["seal"] = hashlib.sha256(repr(document).encode()).hexdigest()
         return "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in document.items()).encode()
-    if kind in ("geojson", "steps", "memory") and rng.random() < 0.6:
+    if kind in ("geojson", "memory") and rng.random() < 0.6:
         return json.dumps(_without_dates(mutate(rng, json.loads(content)))).encode()
     if kind in ("faults", "plan") and rng.random() < 0.6:
         document = mutate(rng, untrusted.parse_toml(content.decode()))
@@ -289,20 +281,15 @@ def _memory(path):
 
 
 def _plan(path):
+    from airflock.runs.folder import read_toml_file
     from airflock.search.tune_stages import read_plan
 
-    read_plan(path)
-
-
-def _hardening(path):
-    from airflock.search.tune_stages import read_steps
-
-    read_steps(path)
+    read_plan(read_toml_file(path), path)
 
 
 READ = {
     "card": _read_card, "certificate": _check_certificate, "faults": _faults, "geojson": _ground, "kml": _ground,
-    "memory": _memory, "log": _replay_log, "plan": _plan, "steps": _hardening, "mesh": _mesh, "stl": _mesh,
+    "memory": _memory, "log": _replay_log, "plan": _plan, "mesh": _mesh, "stl": _mesh,
     **dict.fromkeys(
         ("table", "array", "arrays", "parquet", "ulog", "dataflash", "movement", "tracking"), _tracks_of
     ),

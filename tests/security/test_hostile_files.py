@@ -8,7 +8,6 @@ import os
 import pickle
 import re
 import traceback
-from importlib import import_module
 from pathlib import Path
 
 import mutations
@@ -19,6 +18,7 @@ from damages import Planted
 
 import airflock
 from airflock.drones.onboard.card import card_hash, read_card
+from airflock.runs.folder import REQUEST_FILE, write_toml_file
 from airflock.search.study import load_study
 from airflock.support.errors import AirflockError, ScenarioError
 
@@ -67,9 +67,11 @@ def packed(tmp_path):
     card = json.loads(other_files.sound_card())
     card = {**{key: value for key, value in card.items() if key != "hash"}, "law": {"kind": "evil"}}
     (tmp_path / "card.json").write_text(json.dumps({**card, "hash": card_hash(card)}))
-    (tmp_path / "tuning" / "study").mkdir(parents=True)
-    (tmp_path / "tuning" / "hardening.json").write_text('{"why": "", "steps": []}')
-    (tmp_path / "tuning" / "tuned.toml").write_text(SCENARIO.replace("evil.py", str(tmp_path / "evil.py")))
+    for kind in ("study", "campaign", "tuning", "sweep"):
+        (tmp_path / kind).mkdir()
+        law = str(tmp_path / "evil.py")
+        held = {"run": kind, "name": "evil.toml", "seeds": [0], "scenario": {"model": {"kind": law}}}
+        write_toml_file(tmp_path / kind / REQUEST_FILE, held)
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "best.toml").write_text(SCENARIO.replace("evil.py", str(tmp_path / "evil.py")))
     return tmp_path
@@ -133,7 +135,6 @@ def python(text):
 
 NAMES = {
     "airflock": airflock, "load_study": load_study, "Path": Path, "read_card": read_card,
-    "hardened": import_module("airflock.search.tune_stages").run_hardening_stage,
 }  # fmt: skip
 CONSENT = "would run the code in "
 WAYS = {
@@ -169,7 +170,10 @@ WAYS = {
     "watch against": (command("watch", "vasarhelyi_2018/4ms", "--against", "evil.toml", "--port", "0"), ""),
     "tune": (command("tune", "evil.toml", "--out", "tuned"), ""),
     "tune logs": (command("tune", "log.csv", "--like", "evil.toml", "--out", "tuned"), ""),
-    "folder of a tuning": (python('hardened(Path("tuning"), None, (), None, False, print)'), CONSENT),
+    "folder of a study": (python('airflock.evolve(None, "study", resume=True)'), CONSENT),
+    "folder of a campaign": (python('airflock.certify(folder="campaign", resume=True)'), CONSENT),
+    "folder of a tuning": (python('airflock.tune(None, "tuning", resume=True)'), CONSENT),
+    "folder of a sweep": (python('airflock.sweep(out="sweep", resume=True)'), CONSENT),
     "identify": (command("identify", "log.csv", "--like", "evil.toml"), ""),
     "infer": (command("infer", "log.csv", "--models", "evil.toml"), ""),
     "card of a scenario": (command("fly", "prepare", "evil.toml", "--site", "47,19,0", "--members", "1-3"), ""),

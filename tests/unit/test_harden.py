@@ -6,13 +6,14 @@ import pytest
 import toys
 from airflock.cli import search_verbs as cli_harden
 from airflock.parts.radios.links import received
-from airflock.runs.executors import ThreadExecutor
+from airflock.runs.executors import ScenarioTask, ThreadExecutor
 from airflock.runs.flight_store import FlightStore
+from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import hardening as harden
 from airflock.search.evolution import run_sensitivity
-from airflock.search.hardening_steps import CARRIED, STOPS, StepResult, measures
+from airflock.search.hardening import CARRIED, STOPS, StepResult, measures
 from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -36,11 +37,11 @@ def test_models_without_these_parameters_are_refused():
 def flown_by(monkeypatch, score):
     """Flights whose scores are a function of the parameters and of the seed's chance."""
 
-    def score_flights(scenarios, seeds, **_):
-        chance = {seed: np.random.default_rng(seed).normal() for seed in seeds}
-        return [score(s.parameters, chance[seed]) for s, seed in zip(scenarios, seeds, strict=True)]
+    def scored(task, parameters, seed):
+        return score(with_parameters(task.flown, parameters).parameters, np.random.default_rng(seed).normal())
 
-    monkeypatch.setattr("airflock.engine.score_flights", score_flights)
+    monkeypatch.setattr(ScenarioTask, "score", scored)
+    monkeypatch.setattr(ScenarioTask, "compile", lambda _: None)
 
 
 def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
@@ -162,13 +163,13 @@ def test_a_contact_in_a_few_flights_is_found_on_further_fresh_seeds(monkeypatch)
 def test_measures_beside_the_law_are_tried_where_agents_collide_and_are_no_part_of_the_set(monkeypatch):
     """Late packets bring agents together; carried forward they do not. Stopping is tried where packets are lost."""
 
-    def score_flights(scenarios, seeds, **_):
-        near = [
-            s.radio.delay if s.radio.rule.name == "constant" and s.silence.rule == "fly_on" else 0.0 for s in scenarios
-        ]
-        return [{"fitness": 0.9, "r_min": 9.0 - 8.0 * x, "n_coll": 1.0 * (x > 0.8), "f_coll": 0.9} for x in near]
+    def scored(task, parameters, seed):
+        s = task.scenario
+        near = s.radio.delay if s.radio.rule.name == "constant" and s.silence.rule == "fly_on" else 0.0
+        return {"fitness": 0.9, "r_min": 9.0 - 8.0 * near, "n_coll": 1.0 * (near > 0.8), "f_coll": 0.9}
 
-    monkeypatch.setattr("airflock.engine.score_flights", score_flights)
+    monkeypatch.setattr(ScenarioTask, "score", scored)
+    monkeypatch.setattr(ScenarioTask, "compile", lambda _: None)
     lossy = load("vasarhelyi_2018/6ms", {"radio.loss": 0.1, "radio.delay": 1.0})
     steps = harden.harden(lossy, range(5))
     tried = {step.name: step for step in steps[:-1] if step.verdict.startswith("no part of the set")}

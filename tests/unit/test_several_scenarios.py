@@ -14,7 +14,7 @@ import airflock
 import toys
 from airflock.cli.search_verbs import _optima
 from airflock.engine import score_flight, score_flights
-from airflock.runs.executors import BatchExecutor, ThreadExecutor
+from airflock.runs.executors import BatchExecutor, ScenarioTask, ThreadExecutor
 from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.search_space import with_parameters
@@ -196,16 +196,13 @@ def test_a_step_of_hardening_that_breaks_what_held_in_one_of_two_scenarios_is_un
     first = load("vasarhelyi_2018/6ms")
     late = build_scenario(first.document, "late", FAR)
 
-    def score_flights(scenarios, seeds, **_):
-        return [
-            {
-                "fitness": 0.9, "r_min": s.parameters.p_rep, "n_coll": 0.0, "f_coll": 1.0,
-                "f_wall": 0.2 if s.radio.delay == 0.8 and s.parameters.p_rep > 0.08 else 1.0,
-            }
-            for s in scenarios
-        ]  # fmt: skip
+    def scored(task, parameters, seed):
+        repulsion = parameters["model.p_rep"]
+        walls = 0.2 if task.scenario.radio.delay == 0.8 and repulsion > 0.08 else 1.0
+        return {"fitness": 0.9, "r_min": repulsion, "n_coll": 0.0, "f_coll": 1.0, "f_wall": walls}
 
-    monkeypatch.setattr("airflock.engine.score_flights", score_flights)
+    monkeypatch.setattr(ScenarioTask, "score", scored)
+    monkeypatch.setattr(ScenarioTask, "compile", lambda _: None)
     alone = harden.harden(first, range(5))
     assert alone[-1].verdict == "kept: p_rep up"
     both = harden.harden([first, late], range(5))

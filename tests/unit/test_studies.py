@@ -167,7 +167,7 @@ def test_folders_are_never_written_over(tmp_path):
     study = toys.study()
     open_folder(tmp_path / "a", study, resume=False)
     before = (tmp_path / "a" / "request.toml").read_bytes()
-    with pytest.raises(StudyError, match="already holds this study; continue it with --resume"):
+    with pytest.raises(StudyError, match="already holds a study; continue it with --resume"):
         open_folder(tmp_path / "a", study, resume=False)
     with pytest.raises(StudyError, match="holds another study: search.seed = 0 there, 3 now; give another --out"):
         open_folder(tmp_path / "a", toys.study(seed=3), resume=True)

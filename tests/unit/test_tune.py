@@ -1,7 +1,6 @@
 """Tuning: what it starts from, how it shares time, and that it continues where it was left, with tiny real flights."""
 
 import hashlib
-import json
 import re
 import tomllib
 from types import SimpleNamespace
@@ -16,7 +15,7 @@ from airflock.certificates.campaign import campaign_from_request, scenario_ident
 from airflock.cli.options import parse_seconds
 from airflock.engine import score_flights
 from airflock.runs.flight_store import FlightStore
-from airflock.runs.folder import Interrupted
+from airflock.runs.folder import Interrupted, read_request
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import tuning_run as tuning
@@ -109,7 +108,7 @@ def done(tmp_path_factory, seen):
         patch.setattr(tuning, "measure_flight_rate", lambda *_: 300.0)
         patch.setattr("airflock.search.evolution.draw_study", lambda *_: None)  # the study's own pictures
         patch.setattr(
-            "airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay", "agents")
+            "airflock.search.tuning_run.used_and_unused_keys", lambda _: ("radio.delay", "agents")
         )  # one driver
         return tune(
             build_scenario(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"], watch=seen.append
@@ -175,24 +174,34 @@ def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch
     found, folder = done
     monkeypatch.setattr(tuning, "measure_flight_rate", lambda *_: pytest.fail("the plan is kept"))
     monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
-    monkeypatch.setattr("airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay", "agents"))
-    with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
+    monkeypatch.setattr("airflock.search.tuning_run.used_and_unused_keys", lambda _: ("radio.delay", "agents"))
+    with pytest.raises(StudyError, match="already holds a tuning; continue it with --resume"):
         tune(build_scenario(MINE, "mine"), folder)
     with pytest.raises(StudyError, match="holds the tuning of another scenario"):
         tune(build_scenario({**MINE, "agents": 5}, "mine"), folder, resume=True)
-    steps = json.loads((folder / "hardening.json").read_text())
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*.*") if path.suffix in (".html", ".pdf")}
+    flights = flown(folder)
     again = tune(build_scenario(MINE, "mine"), folder, resume=True)  # limits are those that it began with
     assert [each.text for each in again.certificate.campaign.limits] == ["r_min<0.1 at 10%"]
     assert again.result.parameters == found.result.parameters
-    assert json.loads((folder / "hardening.json").read_text()) == steps
     assert again.certificate.verdicts[0].events == found.certificate.verdicts[0].events
-    kept = (folder / "hardening.json").read_text()
-    (folder / "hardening.json").write_text("[1]")
-    with pytest.raises(StudyError, match=r"hardening.json: holds list"):
-        tune(build_scenario(MINE, "mine"), folder, limit=["r_min<0.1 at 10%"], resume=True)
-    (folder / "hardening.json").write_text(kept)
+    alone = tune(None, folder, resume=True)
+    assert {**alone.document(), "seconds": 0.0} == {**again.document(), "seconds": 0.0} and alone.steps == found.steps
+    assert flown(folder) == flights and before == {path: path.stat().st_mtime_ns for path in before}
+    with pytest.raises(StudyError, match="holds another tuning: limits = "):
+        tune(None, folder, limit=["r_min<0.1 at 20%"], resume=True)
     with pytest.raises(StudyError, match="holds no tuning to resume"):
         tune(build_scenario(MINE, "mine"), tmp_path / "new", resume=True)
+
+
+def flown(folder):
+    """Number of flights in each store below a folder."""
+    found = {}
+    for path in sorted(folder.rglob("*.sqlite")):
+        with FlightStore(path.parent, write=False) as store:
+            found[path.parent.name] = store.count()
+    assert set(found) == {"study", "hardening_flights", "certificate_flights"} and all(found.values())
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -210,19 +219,16 @@ def logs(tmp_path_factory):
 
 
 def test_a_plan_with_margins_of_an_earlier_version_is_refused_in_one_line(done, tmp_path):
-    plan = tmp_path / "tune.toml"
-    kept = (done[1] / "tune.toml").read_text()
-    plan.write_text(f"margins = []\n{kept}")
-    assert read_plan(plan) == read_plan(done[1] / "tune.toml")
-    plan.write_text(f'margins = ["radio.delay"]\n{kept}')
+    held = read_request(done[1], "tuning")
+    assert read_plan({**held, "margins": []}, tmp_path) == read_plan(held, tmp_path)
     with pytest.raises(StudyError, match=r"margins are no longer widened; remove the line `margins` to go on"):
-        read_plan(plan)
+        read_plan({**held, "margins": ["radio.delay"]}, tmp_path)
 
 
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "measure_flight_rate", lambda *_: 300.0)
     monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
-    monkeypatch.setattr("airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay",))
+    monkeypatch.setattr("airflock.search.tuning_run.used_and_unused_keys", lambda _: ("radio.delay",))
     how = {"like": build_scenario(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
     tau = load(tmp_path / "a" / "identified.toml").body.tau
@@ -292,9 +298,9 @@ def test_ctrl_c_between_stages_says_how_to_go_on(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(tuning, "measure_flight_rate", lambda *_: 300.0)
-    monkeypatch.setattr(tuning, "run_search_stage", lambda *_: SimpleNamespace(dead_reason=""))
-    monkeypatch.setattr(tuning, "run_hardening_stage", interrupted)
-    with pytest.raises(Interrupted, match="stages that are over are kept in .*; continue with --resume"):
+    monkeypatch.setattr(tuning, "search_set", lambda *_: SimpleNamespace(dead_reason=""))
+    monkeypatch.setattr(tuning, "harden_set", interrupted)
+    with pytest.raises(Interrupted, match="all flights so far are kept in .*; continue with --resume"):
         tune(build_scenario(MINE, "mine"), tmp_path / "a", budget=4.0, limit=["r_min<0.1 at 10%"])
 
 

@@ -2,10 +2,8 @@
 
 import math
 import os
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product, takewhile
 from pathlib import Path
@@ -43,10 +41,11 @@ from airflock.runs import (
     open_run,
     program_versions,
     read_request,
+    run_folder,
     write_toml_file,
 )
 from airflock.scenarios import Scenario, formats, scenario_variant
-from airflock.support import ErrorCollector, ScenarioError, StudyError, expand_path, suggest
+from airflock.support import ErrorCollector, ScenarioError, StudyError, suggest
 
 # A tolerance says how far a number of the environment may move until a limit can no longer be shown.
 # Every value that is tried flies the same seeds, so that values differ by nothing but themselves. A value is safe where
@@ -423,7 +422,7 @@ def fly_campaign(
     budget : s; None: BUDGET for one that is not over yet
     """
     extras = {"tolerance": list(keys), "split": split, "map": dict(axes or {})}
-    with flight_folder(folder) as path:
+    with run_folder(folder) as path:
         is_over = budget is None and resume is not False and (path / RESULT_FILE).is_file()
         executor = make_executor([campaign.task], scheduler=scheduler, threads=threads, timeout=timeout)
         try:
@@ -500,16 +499,6 @@ def event_timings(campaign: Campaign, counted: CountResult) -> dict[int, EventTi
 
 
 TRIAL = 16  # flights by which the time of one flight is measured
-
-
-@contextmanager
-def flight_folder(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """Yield the folder of flights: the given one, or a temporary one."""
-    if folder is not None:
-        yield expand_path(folder)
-        return
-    with tempfile.TemporaryDirectory(prefix="airflock-certify-") as made:
-        yield Path(made)
 
 
 def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, folder: Path, resume: bool) -> Campaign:

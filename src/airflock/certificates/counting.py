@@ -43,9 +43,7 @@ class CampaignFlyer:
 
     def fly(self, batch: CandidateBatch, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over and stored."""
-        for landed in self.executor.fly(tasks):
-            self.store.land(batch, landed)
-            yield landed
+        return self.store.fly(self.executor, batch, tasks)
 
     def report(self, text: str) -> None:
         """Call `note`, if there is one, as a part begins."""

@@ -70,6 +70,8 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             **CODE_OPTIONS,
             **MANY_FLIGHT_OPTIONS,
             **JSON_OPTIONS,
+            "out": "out",
+            "resume": "resume",
             "table": "the table returned",
             "plot": "airflock.plots.heatmap",
             "show": "a column of the table returned",

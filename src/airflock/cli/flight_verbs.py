@@ -22,8 +22,6 @@ from airflock.support import (
     ScenarioError,
     StudioError,
     collect_errors,
-    invalid_if,
-    value_or_default,
 )
 
 ScoreValues = Mapping[str, Any]  # order parameters, or keys with their values, by name
@@ -288,16 +286,21 @@ MAX_GRID_POINTS = 100_000  # of one key, and points of a whole grid
 
 def sweep(
     ctx: typer.Context,
-    scenario: options.Where,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="PRESET|FILE", help="A preset or a scenario file; none to --resume a folder.", show_default=False
+        ),
+    ] = None,
     over: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             "--over",
             metavar="KEY=VALUES",
             help="Values to fly, as a list a,b,c or a range low:high:count; repeat for a grid.",
             show_default=False,
         ),
-    ],
+    ] = None,
     seeds: options.Seeds = 5,
     first_seed: options.FirstSeed = 0,
     changes: options.Set = None,
@@ -310,6 +313,8 @@ def sweep(
     device: options.Device = "cpu",
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder that keeps every flight as it lands.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the sweep in the folder.")] = False,
     table: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Write one row per flight.")] = None,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw a heat map (two keys) or a line (one key).")
@@ -323,32 +328,36 @@ def sweep(
 
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
-    from airflock.recordings import fly_points, grid_points, metric_to_show, scenarios_at
+    from airflock.recordings import fly_sweep, make_sweep, metric_to_show, resumed_sweep
 
     errors = options.collect_option_errors(ctx)
     errors.read(options.check_writable, (table, TABLES), (plot, PICTURES))
     fixed = options.collect_settings(errors, changes, agents, duration)
-    axes = _axes(over, plot, errors)
-    points = errors.read(grid_points, axes)
-    scenarios = invalid_if(
-        fixed, errors.read(scenarios_at, scenario, points, value_or_default(fixed, {}), law, trust=trust)
-    )
-    name = errors.read(metric_to_show, show, scenarios)
-    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    if scenario is None and (out is None or not resume):
+        errors.note("sweep: give a scenario and --over, or --out DIR --resume")
+    elif scenario is None:
+        made = errors.read(resumed_sweep, out, trust=trust, over=over, settings=fixed, law=law)
+    else:
+        axes = _axes(over or [], plot, errors)
+        numbers = errors.read(options.seeds_from, first_seed, seeds)
+        made = errors.read(make_sweep, scenario, axes, numbers, fixed, law, precision, trust=trust)
+    name = errors.read(lambda found: metric_to_show(show, found.scenarios), made) if scenario or resume else ""
     errors.read(options.check_flight_options, device, precision, scheduler)
     errors.raise_errors()
-    terminal.print_notes(merge_similar_notes(dict.fromkeys(note for found in scenarios for note in found.notes)))
+    terminal.print_notes(merge_similar_notes(dict.fromkeys(note for found in made.scenarios for note in found.notes)))
     if scheduler is None:
-        options.announce_run_time([found for found in scenarios for _ in numbers], threads, device)
-        options.compile_before_bar(scenarios[0], precision, device)
-    with counting_parts(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
-        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "on_done": done, "device": device}
-        tidy = fly_points(points, scenarios, numbers, **chosen, notify=terminal.print_message, scheduler=scheduler)
-    _keep(tidy, list(axes), name, scenarios[0], table, plot)
+        options.announce_run_time([found for found in made.scenarios for _ in made.seeds], threads, device)
+        options.compile_before_bar(made.scenarios[0], made.precision, device)
+    with counting_parts(f"{made.scenario.name}: flights", len(made.points) * len(made.seeds), quiet=as_json) as done:
+        tidy = fly_sweep(
+            made, out=out, resume=resume, threads=threads, on_done=done, device=device, scheduler=scheduler,
+            notify=terminal.print_message,
+        )  # fmt: skip
+    _keep(tidy, list(made.over), name, made.scenarios[0], table, plot)
     if as_json:
-        terminal.print_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
+        terminal.print_json({"scenario": made.scenario.name, "seeds": len(made.seeds), "runs": tidy.to_dict("records")})
     else:
-        _print_sweep(tidy, list(axes), name)
+        _print_sweep(tidy, list(made.over), name)
 
 
 def _axes(over: list[str], plot: Path | None, errors: ErrorCollector) -> dict[str, list[Any]]:

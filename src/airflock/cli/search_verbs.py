@@ -292,13 +292,17 @@ def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
 
 def tune(
     ctx: typer.Context,
-    scenario: Annotated[
-        list[str],
-        typer.Argument(metavar="FILE|PRESET|LOGS", help="Your drones, field and speed; or logs, with --like."),
-    ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for all results.", show_default=False)
     ],
+    scenario: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="FILE|PRESET|LOGS",
+            show_default=False,
+            help="Your drones, field and speed; or logs, with --like; none to --resume what the folder holds.",
+        ),
+    ] = None,
     budget: Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 20min or 2h.")] = "20min",
     limit: Annotated[
         list[str] | None,
@@ -350,21 +354,24 @@ def tune(
     errors = options.collect_option_errors(ctx)
     seconds = errors.read(options.parse_seconds, budget)
     settings = options.collect_settings(errors, changes, agents, duration)
-    base = options.collect_scenario(errors, errors.read(_start_scenario, scenario, like, heard), settings, trust=trust)
-    start = errors.read(_tuned_scenario, base, like)
-    plan = (
-        errors.read(load_plan, out, start, resume) if like is None else None
-    )  # with logs it depends on their contents
     if confidence is not None:
         errors.read(check_confidence, confidence)
-    errors.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
+    base: Any = None
+    if scenario or not resume:
+        place = errors.read(_start_scenario, scenario or [], like, heard)
+        base = options.collect_scenario(errors, place, settings, trust=trust)
+        start = errors.read(_tuned_scenario, base, like)
+        # with logs it depends on their contents
+        plan = errors.read(load_plan, out, start, resume) if like is None else None
+        errors.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
+        errors.raise_errors()
+        terminal.print_notes(start.notes)
+        options.compile_before_bar(base, 32, "cpu")
     errors.raise_errors()
-    terminal.print_notes(start.notes)
-    options.compile_before_bar(base, 32, "cpu")
     what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
     if like is not None:
-        how |= {"like": base, "heard": heard}
+        how |= {"like": base or like, "heard": heard}
     shown: list[str] = []
     with progress_line(as_json) as line:
 
@@ -388,7 +395,7 @@ def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -
     """Return the scenario that names law, field and speed: the tuned one or, with logs, that of --like."""
     if like is not None:
         return like
-    if len(scenario) > 1 or heard is not None:
+    if len(scenario) != 1 or heard is not None:
         raise ScenarioError([f"{', '.join(scenario)}: give one scenario to tune; with logs, give --like PRESET"])
     if Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
         raise ScenarioError([f"{scenario[0]}: is not a scenario file (.toml); with logs, give --like PRESET"])

@@ -76,8 +76,8 @@ from .simulation import (
     to_plain_values as to_plain_values,
 )
 from .sweeps import (
-    fly_points as fly_points,
-    grid_points as grid_points,
+    fly_sweep as fly_sweep,
+    make_sweep as make_sweep,
     metric_to_show as metric_to_show,
-    scenarios_at as scenarios_at,
+    resumed_sweep as resumed_sweep,
 )

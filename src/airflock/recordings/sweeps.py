@@ -1,24 +1,48 @@
 """Sweeps: order parameters over a grid of values of any keys."""
 
+import hashlib
 import itertools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
 
 import pandas as pd
 
+from airflock import __version__
+from airflock.engine import pick_device
 from airflock.parts.metrics import reported_values, scalar_names
 from airflock.recordings.scores import with_units
-from airflock.runs import score_scenarios
-from airflock.scenarios import Scenario, check_seeds, scenario_variant, short_keys
-from airflock.support import ScenarioError, collect_errors, suggest
+from airflock.runs import (
+    CandidateBatch,
+    Flight,
+    ScenarioTask,
+    check_worker_device,
+    fingerprint,
+    held_request,
+    make_executor,
+    open_folder,
+    open_run,
+    score_scenarios,
+)
+from airflock.scenarios import Scenario, build_scenario, check_seeds, scenario_variant, short_keys
+from airflock.support import (
+    ScenarioError,
+    StudyError,
+    as_error,
+    atomic,
+    collect_errors,
+    expand_path,
+    suggest,
+)
 
 ORDER = "polarisation"  # shown where nothing judges flights: the first that a set reports may be a constant speed
 
 
 def sweep(
-    scenario: Scenario | str | os.PathLike[str],
-    over: Mapping[str, Sequence[Any]],
+    scenario: Scenario | str | os.PathLike[str] | None = None,
+    over: Mapping[str, Sequence[Any]] | None = None,
     seeds: int | Iterable[int] = 5,
     *,
     settings: Mapping[str, Any] | None = None,
@@ -30,13 +54,15 @@ def sweep(
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
     scheduler: str | None = None,
+    out: str | os.PathLike[str] | None = None,
+    resume: bool = False,
 ) -> pd.DataFrame:
     """Fly a scenario over a grid of values, several seeds at each point of the grid.
 
     Parameters
     ----------
-    scenario : Scenario, str or path
-        A scenario, or the name of a preset or scenario file.
+    scenario : Scenario, str or path, optional
+        A scenario, or the name of a preset or scenario file; none to continue what a folder holds.
     over : mapping
         Keys and the values that each takes; several keys make a grid.
     seeds : int or iterable of int
@@ -59,6 +85,10 @@ def sweep(
         Called with the choice of auto.
     scheduler : str, optional
         Address of a dask scheduler whose workers fly, instead of this process.
+    out : str or path, optional
+        Folder that keeps every flight as it lands, and the table as result.csv.
+    resume : bool
+        Continue the sweep in the folder, which holds scenario, grid and seeds.
 
     Returns
     -------
@@ -81,11 +111,70 @@ def sweep(
     >>> table.attrs["units"]["phi_vel"], table.attrs["meanings"]["phi_vel"]
     ('m/s', 'mean speed')
     """
+    if scenario is None:
+        beside = {"over": over, "settings": settings, "law": law}
+        made = resumed_sweep(out if resume else None, trust=trust, **beside)
+    else:
+        made = make_sweep(scenario, over or {}, check_seeds(seeds), settings, law, precision, trust=trust)
+    options = {"threads": threads, "on_done": done, "device": device, "notify": say}
+    return fly_sweep(made, scheduler=scheduler, out=out, resume=resume, **options)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A grid of scenarios, each flown with the same seeds.
+
+    scenario  : what the points change
+    scenarios : one for each of `points`
+    """
+
+    scenario: Scenario
+    over: Mapping[str, Sequence[Any]]
+    seeds: Sequence[int]
+    precision: int
+    points: Sequence[Mapping[str, Any]]
+    scenarios: Sequence[Scenario]
+    kind = "sweep"
+    also: ClassVar[Mapping[str, Any]] = {}
+
+    def document(self) -> dict[str, Any]:
+        """Return the sweep as plain values: the request in its folder."""
+        rules = "".join(fingerprint(each, self.precision) for each in self.scenarios)
+        return {
+            "airflock": __version__,
+            "rules": hashlib.sha256(rules.encode()).hexdigest()[:12],
+            "precision": self.precision,
+            "name": self.scenario.name,
+            "seeds": list(self.seeds),
+            "over": {key: list(values) for key, values in self.over.items()},
+            "scenario": {key: value for key, value in self.scenario.document.items() if key != "published"},
+        }
+
+
+def make_sweep(
+    scenario: Scenario | str | os.PathLike[str],
+    over: Mapping[str, Sequence[Any]],
+    seeds: Sequence[int],
+    settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    precision: int = 32,
+    *,
+    trust: bool = False,
+) -> Sweep:
+    """Make a sweep. Raises ScenarioError with the errors of all points."""
     points = grid_points(over)
     scenarios = scenarios_at(scenario, points, settings, law, trust=trust)
-    numbers = check_seeds(seeds)
-    options = {"threads": threads, "precision": precision, "on_done": done, "device": device, "notify": say}
-    return fly_points(points, scenarios, numbers, scheduler=scheduler, **options)
+    base = scenario_variant(scenario, settings, law, trust=trust)
+    return Sweep(base, over, seeds, precision, points, scenarios)
+
+
+def resumed_sweep(folder: str | os.PathLike[str] | None, *, trust: bool = False, **given: Any) -> Sweep:
+    """Return the sweep that a folder holds; options that it holds itself (`given`) are refused."""
+    held = held_request(folder, Sweep.kind, given)
+    with as_error(folder or "", StudyError):
+        name, seeds = str(held["name"]), check_seeds(held["seeds"])
+        base = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
+        return make_sweep(base, held["over"], seeds, precision=held["precision"], trust=trust)
 
 
 def grid_points(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
@@ -130,17 +219,43 @@ def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequenc
     return errors
 
 
-def fly_points(
-    points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario], seeds: Sequence[int], **options: Any
+def fly_sweep(
+    made: Sweep, *, out: str | os.PathLike[str] | None = None, resume: bool = False, **options: Any
 ) -> pd.DataFrame:
     """Fly all seeds at all points and return a tidy table; options as in `sweep`."""
     # One list of all flights: workers are busy until the end of the sweep, not of each point.
-    jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
-    flights = [found for _, found, _ in jobs]
-    rows = score_scenarios(flights, [seed for _, _, seed in jobs], **options)
-    table = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
-    known = {name: text for found in scenarios for name, text in reported_values(found.metrics.rule).items()}
+    jobs = [(place, seed) for place in range(len(made.points)) for seed in made.seeds]
+    flights = [made.scenarios[place] for place, _ in jobs]
+    if out is None:
+        rows = score_scenarios(flights, [seed for _, seed in jobs], precision=made.precision, **options)
+    else:
+        rows = _fly_in_folder(made, expand_path(out), resume=resume, **options)
+    table = pd.DataFrame([{**made.points[i], "seed": seed, **row} for (i, seed), row in zip(jobs, rows, strict=True)])
+    if out is not None:
+        atomic.write_file(expand_path(out) / "result.csv", table.to_csv(index=False))
+    known = {name: text for found in made.scenarios for name, text in reported_values(found.metrics.rule).items()}
     return with_units(table, known)
+
+
+def _fly_in_folder(
+    made: Sweep, folder: Path, *, resume: bool, device: str, scheduler: str | None, threads: int | None,
+    on_done: Callable[[], None] | None, notify: Callable[[str], None] | None,
+) -> list[Mapping[str, Any]]:  # fmt: skip
+    """Fly what the folder does not hold yet; return the order parameters of all flights as it holds them."""
+    if max(made.seeds) >= 1 << 63:
+        raise StudyError(f"seed = {max(made.seeds)}: a folder keeps seeds below 2^63; leave out --out, or take another")
+    open_folder(folder, made, resume=resume)
+    check_worker_device(scheduler, device)
+    if scheduler is None:
+        device = pick_device(list(made.scenarios), device, precision=made.precision, notify=notify)
+    tasks = [ScenarioTask(each, made.precision, device) for each in made.scenarios]
+    batch = CandidateBatch("sweep", 0, 0)
+    executor = make_executor(tasks, scheduler=scheduler, threads=threads)
+    with open_run(folder, executor) as store:
+        store.ask(batch, [[float(i)] for i in range(len(tasks))], made.points)
+        flights = [Flight(i, j, {}, seed, i) for i in range(len(tasks)) for j, seed in enumerate(made.seeds)]
+        rows = store.fly_missing(executor, batch, flights, on_done)
+    return [rows[flight.candidate_index, flight.repeat] for flight in flights]
 
 
 def metric_to_show(metric: str | None, scenarios: Sequence[Scenario]) -> str:

@@ -28,6 +28,7 @@ from .folder import (
     program_versions as program_versions,
     read_request as read_request,
     read_toml_file as read_toml_file,
+    run_folder as run_folder,
     to_toml_values as to_toml_values,
     write_toml_file as write_toml_file,
 )

@@ -12,13 +12,13 @@ import os
 import platform
 import sqlite3
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.runs.executors import FlightResult
-from airflock.support import FormatError, StudyError, as_error, locks, parse_json, parse_json_object
+from airflock.runs.executors import Executor, Flight, FlightResult
+from airflock.support import FlightError, FormatError, StudyError, as_error, locks, parse_json, parse_json_object
 
 FILE, LOCK = "evaluations.sqlite", "writer.lock"
 # Tables have no row numbers, so contents do not depend on the order in which flights land. One
@@ -143,6 +143,35 @@ class FlightStore:
         with as_study_error(self.path):
             self.connection.execute("INSERT OR IGNORE INTO flight VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
         self.landed += 1
+
+    def fly(self, executor: Executor, batch: CandidateBatch, flights: Sequence[Flight]) -> Iterator[FlightResult]:
+        """Yield each flight as soon as it is over and stored."""
+        for landed in executor.fly(flights):
+            self.land(batch, landed)
+            yield landed
+
+    def fly_missing(
+        self, executor: Executor, batch: CandidateBatch, flights: Sequence[Flight], on_done: Callable[[], None] | None
+    ) -> dict[tuple[int, int], Mapping[str, Any]]:
+        """Fly those flights of a batch that the store does not hold; return the scores of all, as it holds them.
+
+        on_done : called for each flight, those of the store included
+        Raises FlightError for a flight that failed, now or before.
+        """
+        flown = self.flown(batch)
+        missing = [each for each in flights if (each.candidate_index, each.repeat) not in flown]
+        for _ in range(len(flights) - len(missing) if on_done else 0):
+            on_done()
+        for landed in self.fly(executor, batch, missing):
+            if landed.values is None:
+                break
+            if on_done:
+                on_done()
+        of_batch = "SELECT reason FROM flight WHERE stage=? AND run=? AND generation=?"
+        failed = self.rows(f"{of_batch} AND scores IS NULL", batch)
+        if failed:
+            raise FlightError(str(failed[0][0]))
+        return {key: row or {} for key, row in self.flown(batch).items()}
 
     def flown(self, batch: CandidateBatch) -> dict[tuple[int, int], Mapping[str, Any] | None]:
         """(candidate, repeat) → order parameters of the flights that the store holds, None of those that failed."""

@@ -8,6 +8,7 @@ import hashlib
 import os
 import platform
 import re
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
@@ -48,8 +49,24 @@ class Work(Protocol):
         """Return everything that decides its result, as plain values."""
 
 
-def read_request(folder: Path, kind: str) -> dict[str, Any] | None:
-    """Return the request in a folder, None if it holds none. Raises StudyError for a run of another kind."""
+def read_request(folder: Path, kind: str, *, resume: bool | None = None) -> dict[str, Any] | None:
+    """Return the request in a folder, None if it holds none.
+
+    resume : as `open_folder` takes it
+    Raises StudyError for a run of another kind, and for a folder that may not be begun or continued.
+    """
+    held = _request(folder, kind)
+    if held is not None and resume is False:
+        raise StudyError(f"{folder}: already holds a {kind}; continue it with --resume, or give another --out")
+    if held is None and resume:
+        raise StudyError(f"{folder}: holds no {kind} to resume ({REQUEST_FILE} is missing)")
+    # hidden files: what a process that was killed had begun to write
+    if held is None and folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
+        raise StudyError(f"{folder}: is not empty and holds no {REQUEST_FILE}; give a new folder")
+    return held
+
+
+def _request(folder: Path, kind: str) -> dict[str, Any] | None:
     for name in (REQUEST_FILE, *OLD_FILES):
         if (folder / name).is_file():
             held = read_toml_file(folder / name)
@@ -88,19 +105,15 @@ def open_folder(folder: Path, work: Work, *, resume: bool | None = None, also: M
     A fitness of the user's own may have been mended since: flights that are stored are judged by
     it. Returns a note of that, or "". Raises StudyError where the folder holds something else.
     """
-    kind, held = work.kind, read_request(folder, work.kind)
-    if held is None and resume:
-        raise StudyError(f"{folder}: holds no {kind} to resume ({REQUEST_FILE} is missing)")
+    kind, held = work.kind, read_request(folder, work.kind, resume=resume)
     also = {**work.also, **(also or {})}
     now, note, comment = to_toml_values(work.document()), "", "Written once, when it began."
     if held is not None:
         before = held.pop("also", {})
         changed = differences(held, now)
-        mended = resume is not False and bool(changed) and all(FITNESS_TEXT.match(line) for line in changed)
+        mended = bool(changed) and all(FITNESS_TEXT.match(line) for line in changed)
         if not mended:
             same_or_refuse(folder, held, now, kind)
-        if resume is False:
-            raise StudyError(f"{folder}: already holds this {kind}; continue it with --resume, or give another --out")
         also = before | also
         if mended:
             with FlightStore(folder) as store:
@@ -110,9 +123,6 @@ def open_folder(folder: Path, work: Work, *, resume: bool | None = None, also: M
             note = f"the fitness has changed ({shown}): flights of {folder} are judged by the one of now"
         elif to_toml_values(also) == before:
             return ""
-    # hidden files: what a process that was killed had begun to write
-    elif folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
-        raise StudyError(f"{folder}: is not empty and holds no {REQUEST_FILE}; give a new folder")
     document = {"run": kind, **now, **({"also": also} if also else {})}
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -120,6 +130,16 @@ def open_folder(folder: Path, work: Work, *, resume: bool | None = None, also: M
     except OSError as error:
         raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
     return note
+
+
+@contextmanager
+def run_folder(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
+    """Yield the folder of a run: the given one, or a temporary one."""
+    if folder is not None:
+        yield expand_path(folder)
+        return
+    with tempfile.TemporaryDirectory(prefix="airflock-") as made:
+        yield Path(made)
 
 
 @contextmanager

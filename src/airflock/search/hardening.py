@@ -10,36 +10,224 @@ the trees of another. So a step stays only if it gains, costs little, and keeps 
 that held; else half of it is tried, else it is undone. What is left is judged on fresh seeds.
 """
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock import __version__
 from airflock.certificates import EventLimit, estimated_probability
-from airflock.runs import declared_numbers, to_toml_values
-from airflock.scenarios import Scenario, formats, load_if_named
-from airflock.search.generations import ZERO_FITNESS, zero_fitness_reason
-from airflock.search.hardening_steps import (
-    TABLE_S4_STEPS,
-    WALL_STEPS,
-    HardeningStep,
-    ScoreColumns,
-    StepResult,
-    compare_with_optimum,
-    fly_parameters,
-    join_rounds,
-    join_scenarios,
-    measures,
-    parameters_after_step,
-    recipe_parameters,
-    table_rows,
+from airflock.runs import (
+    CandidateBatch,
+    Executor,
+    Flight,
+    FlightStore,
+    ScenarioTask,
+    declared_numbers,
+    fingerprint,
+    make_executor,
+    open_folder,
+    open_run,
+    run_folder,
+    to_toml_values,
 )
+from airflock.scenarios import Scenario, formats, load_if_named, rebuilt
+from airflock.search.generations import ZERO_FITNESS, zero_fitness_reason
 from airflock.search.limit_excess import allowed_probability, limit_excess
 from airflock.search.objectives import read_limits
 from airflock.search.search_settings import SearchSettings
 from airflock.search.study_result import mean_interval
 from airflock.support import ScenarioError
+
+ScoreColumns = Mapping[str, NDArray[np.float64]]  # score → its values (seed,)
+
+S4 = "Table S4"
+
+
+@dataclass(frozen=True)
+class HardeningStep:
+    """One change of the recipe: factors on keys, and why.
+
+    braking_lead : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls and obstacles
+    """
+
+    name: str
+    factors: Mapping[str, float]
+    reason: str
+    braking_lead: float = 0.0
+
+
+# ratios of Table S4 to Table S1, columns 4, 6, 8 m/s: p_rep 2.3, 1.4, 1.7; C_frict 10, 10, 8;
+# v_shill 0.74, 0.71, 0.61; r0_shill from 0.3, 0.5, 0.1 m to 0, 5, 30 m
+TABLE_S4_STEPS = (
+    HardeningStep("p_rep up", {"model.p_rep": 1.5}, f"{S4}: gain increased to prevent collisions"),
+    HardeningStep("c_frict up", {"model.c_frict": 3.0}, f"{S4}: increased substantially to minimise oscillations"),
+    HardeningStep("c_frict up again", {"model.c_frict": 3.0}, f"{S4}: 8 to 10 times in all, here in two steps"),
+    HardeningStep(
+        "v_shill down, r0_shill up", {"model.v_shill": 0.7}, f"{S4}: a higher r0_shill makes up for it", 0.5
+    ),  # 0.5 s: 2 to 4 m; the paper's table has 0, 5 and 30 m
+)
+# where agents leave the arena or enter obstacles
+WALL_STEPS = tuple(
+    HardeningStep(name, {}, "our choice: earlier braking, nothing else", 0.5) for name in ("r0_shill up", "and again")
+)
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """Parameters of one step and what they cost and gain against the optimum, over paired seeds.
+
+    fitness, r_min, n_coll : mean over seeds; r_min (m) is the smallest distance of two agents in a flight
+    cost, gain : fitness lost and smallest distance won (m) against the first step: mean, and 95 % interval
+    parts    : mean of each partial fitness
+    contacts : share of flights in which somebody left the arena or entered an obstacle; nan where nobody looked
+    clearance : mean over seeds of the smallest distance to walls and obstacles, m; nan where nobody looked
+    kept     : whether the step stays; verdict: why, or why not
+    """
+
+    name: str
+    reason: str
+    parameters: Mapping[str, float]
+    fitness: float
+    r_min: float
+    n_coll: float
+    cost: tuple[float, float, float]
+    gain: tuple[float, float, float]
+    parts: Mapping[str, float] = field(default_factory=dict)
+    contacts: float = math.nan
+    clearance: float = math.nan
+    kept: bool = True
+    verdict: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the step as plain values."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
+
+
+def recipe_parameters(
+    scenario: Scenario, steps: Sequence[HardeningStep] = TABLE_S4_STEPS
+) -> list[tuple[HardeningStep, dict[str, float]]]:
+    """Return the parameters after each step, the optimum first; values stay inside their declared ranges."""
+    known = declared_numbers(scenario)
+    keys = {key for step in (*steps, *TABLE_S4_STEPS) for key in step.factors} | {"model.r0_shill"}
+    missing = sorted(key for key in keys if key not in known)
+    if missing:
+        raise ScenarioError(
+            [
+                f"{scenario.name}: no recipe for model {scenario.model.name}: {key} is not a number of it"
+                for key in missing
+            ]
+        )
+    now = {key: float(known[key][1] or 0.0) for key in sorted(keys)}
+    found = [(HardeningStep("optimum", {}, "where hardening begins"), dict(now))]
+    for step in steps:
+        now = parameters_after_step(scenario, now, step)
+        found.append((step, now))
+    return found
+
+
+def parameters_after_step(
+    scenario: Scenario, parameters: Mapping[str, float], step: HardeningStep, step_share: float = 1.0
+) -> dict[str, float]:
+    """Return the parameters after a step or a part of it; values stay inside their declared ranges."""
+    known, found = declared_numbers(scenario), dict(parameters)
+    for key, factor in step.factors.items():
+        found[key] = _inside(found[key] * factor**step_share, known[key][0])
+    if step.braking_lead:
+        far = step_share * step.braking_lead * (scenario.resolved_metrics().v_flock or 0.0)
+        found["model.r0_shill"] = _inside(found["model.r0_shill"] + far, known["model.r0_shill"][0])
+    return found
+
+
+def _inside(value: float, how: Any) -> float:
+    return min(max(value, float(how.low)), float(how.high))
+
+
+def compare_with_optimum(
+    before: ScoreColumns,
+    after: ScoreColumns,
+    step: HardeningStep,
+    parameters: Mapping[str, float],
+) -> StepResult:
+    """Compare a step with the optimum on the same seeds."""
+    mean, _, low, high = mean_interval((before["fitness"] - after["fitness"]).tolist())
+    won, _, least, most = mean_interval((after["r_min"] - before["r_min"]).tolist())
+    parts = {name: float(values.mean()) for name, values in after.items() if name.startswith("f_")}
+    contacts = float((after["phi_wall"] > 0.0).mean()) if "phi_wall" in after else math.nan
+    room = float(after["clearance"].mean()) if "clearance" in after else math.nan
+    fitness, near, hits = (float(after[name].mean()) for name in ("fitness", "r_min", "n_coll"))
+    cost, gain = (mean, low, high), (won, least, most)
+    return StepResult(step.name, step.reason, parameters, fitness, near, hits, cost, gain, parts, contacts, room)
+
+
+def table_rows(table: ScoreColumns) -> list[dict[str, float]]:
+    """Return the scores of each flight as a row."""
+    names = list(table)
+    return [dict(zip(names, row, strict=True)) for row in np.array([table[name] for name in names]).T.tolist()]
+
+
+def join_rounds(rounds: Sequence[Sequence[ScoreColumns]]) -> list[ScoreColumns]:
+    """Join the flights of all rounds to one table for each scenario."""
+    return [
+        {name: np.concatenate([t[name] for t in tables]) for name in tables[0]} for tables in zip(*rounds, strict=True)
+    ]
+
+
+def join_scenarios(tables: Sequence[ScoreColumns]) -> ScoreColumns:
+    """Join the flights of all scenarios to one table of the scores that all of them have."""
+    if len(tables) == 1:
+        return tables[0]
+    names = [name for name in tables[0] if all(name in table for table in tables)]
+    return {name: np.concatenate([table[name] for table in tables]) for name in names}
+
+
+CARRIED = "neighbours carried forward"
+STOPS = "stop near a lost neighbour"
+
+
+def measures(scenarios: Sequence[Scenario]) -> list[tuple[HardeningStep, list[Scenario], str]]:
+    """Return measures that could change a flight in any scenario: step, changed scenarios, and what to set."""
+    # Reported, never applied: whether the drones have such a program is not for a search to decide.
+    found = []
+    for name, reason, settings in (
+        (CARRIED, "Vásárhelyi et al. 2018, Drone setup: positions are carried forward by velocities", _carried),
+        (STOPS, "our choice: a neighbour that is not heard may still be near", _stops),
+    ):
+        changes = [settings(scenario) for scenario in scenarios]
+        if not any(changes):
+            continue
+        try:
+            flown = [rebuilt(s, change) if change else s for s, change in zip(scenarios, changes, strict=True)]
+        except ScenarioError:  # the law has no such form, or the flock is too large for it
+            continue
+        first = next(change for change in changes if change)
+        found.append(
+            (HardeningStep(name, {}, reason), flown, " ".join(f"--set {key}={value}" for key, value in first.items()))
+        )
+    return found
+
+
+def _carried(scenario: Scenario) -> dict[str, Any]:
+    """Return settings by which each packet is carried forward until the next one; no further packet is lost."""
+    if scenario.radio.rule.name != "constant" or scenario.radio.delay <= 0.0:
+        return {}
+    rate = max(10.0, 1.0 / max(scenario.sensors.period, scenario.flight.dt))
+    far = min(max(scenario.radio.range, 1.0), 1e6)
+    whole = {"radio.received_near": 1.0, "radio.received_far": 1.0, "radio.near": 0.5 * far, "radio.far": far}
+    return {"radio.kind": "links", **whole, "radio.fast_rate": rate}
+
+
+def _stops(scenario: Scenario) -> dict[str, Any]:
+    """Return settings by which an agent stops near a lost neighbour, if packets may be lost."""
+    deaf = any(entry.fault.radio is not None for entry in scenario.faults)
+    lost = deaf or scenario.radio.rule.name not in ("constant", "vision") or scenario.radio.loss > 0.0
+    return {"silence.rule": "stop"} if lost and scenario.silence.rule == "fly_on" else {}
+
 
 SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that are constraints; the others are its price
 # The recipe of Table S4, flown to its end, moved the partial fitness of walls from 0.995 to 0.14 in
@@ -139,6 +327,32 @@ def has_gained(before: ScoreColumns, after: ScoreColumns) -> bool:
 MAX_FRESH_ROUNDS = 3  # of fresh seeds: 4 % of flights with a contact pass 60 seeds in 30 % of all cases, 180 in 7 %
 
 
+@dataclass(frozen=True)
+class Hardening:
+    """A hardening: everything that decides its result."""
+
+    scenarios: Sequence[Scenario]
+    seeds: Sequence[int]
+    steps: Sequence[HardeningStep]
+    constraints: Constraints
+    kind = "hardening"
+    also: ClassVar[Mapping[str, Any]] = {}
+
+    def document(self) -> dict[str, Any]:
+        """Return the hardening as plain values: the request in its folder."""
+        scenarios = [{k: v for k, v in each.document.items() if k != "published"} for each in self.scenarios]
+        return {
+            "airflock": __version__,
+            "rules": " ".join(fingerprint(each, 32) for each in self.scenarios),
+            "names": [each.name for each in self.scenarios],
+            "seeds": list(self.seeds),
+            "cost": self.constraints.cost,
+            "limits": [limit.text for limit in self.constraints.limits],
+            "steps": [{"name": s.name, "factors": dict(s.factors), "braking_lead": s.braking_lead} for s in self.steps],
+            **{f"scenario_{i}": document for i, document in enumerate(scenarios, 1)},
+        }
+
+
 class HardeningCandidate:
     """Candidate of hardening: the kept parameters and their flights; steps are judged against them and the optimum.
 
@@ -149,19 +363,19 @@ class HardeningCandidate:
 
     def __init__(
         self,
-        scenarios: Sequence[Scenario],
+        work: Hardening,
         optimum: tuple[HardeningStep, dict[str, float]],
-        seeds: Sequence[int],
-        constraints: Constraints,
-        threads: int | None = None,
+        store: FlightStore,
+        executor: Executor,
         on_done: Callable[[], None] | None = None,
     ):
-        self.scenarios, self.constraints, self.threads, self.done = scenarios, constraints, threads, on_done
-        self.seeds, n = list(seeds), len(seeds)
-        self.fresh = [[max(seeds) + 1 + n * k + i for i in range(n)] for k in range(MAX_FRESH_ROUNDS)]
+        self.scenarios, self.constraints, self.done = work.scenarios, work.constraints, on_done
+        self.store, self.executor, self.number = store, executor, itertools.count()
+        self.seeds, n = list(work.seeds), len(work.seeds)
+        self.fresh = [[max(self.seeds) + 1 + n * k + i for i in range(n)] for k in range(MAX_FRESH_ROUNDS)]
         self.optimum = self.table = self._fly(optimum[1], self.seeds)
         self.kept, self.seen = [optimum], [optimum[1]]
-        for scenario, table in zip(scenarios, self.optimum, strict=True):
+        for scenario, table in zip(self.scenarios, self.optimum, strict=True):
             if float(table["fitness"].max()) < ZERO_FITNESS:
                 columns = {name: values.tolist() for name, values in table.items()}
                 rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -259,10 +473,30 @@ class HardeningCandidate:
     def _fly(
         self, parameters: Mapping[str, float], seeds: Sequence[int], scenarios: Sequence[Scenario] = ()
     ) -> list[ScoreColumns]:
-        return [
-            fly_parameters(each, [parameters], seeds, self.threads, self.done)[0]
-            for each in scenarios or self.scenarios
+        """Fly parameters with these seeds in each scenario, of the law itself or with a program beside it."""
+        # Steps follow from flights alone, so a hardening that is resumed asks for the same flights in the same order.
+        batch, n = CandidateBatch("harden", next(self.number), 0), len(self.scenarios)
+        self.store.ask(batch, [[]], [parameters])
+        flights = [
+            Flight(0, j * n + place, parameters, seed, place) for j, seed in enumerate(seeds) for place in range(n)
         ]
+        executor = make_executor([ScenarioTask(each) for each in scenarios]) if scenarios else self.executor
+        flown = self.store.fly_missing(executor, batch, flights, self.done)
+        if scenarios:
+            executor.close()
+        return [
+            score_columns(scenario, [flown[0, j * n + place] for j in range(len(seeds))])
+            for place, scenario in enumerate(self.scenarios)
+        ]
+
+
+def score_columns(scenario: Scenario, rows: Sequence[Mapping[str, Any]]) -> ScoreColumns:
+    """Return the numbers among the scores of flights as columns (seed,)."""
+    if not {"fitness", "r_min"} <= set(rows[0]):
+        kind = scenario.metrics.rule.name
+        raise ScenarioError([f"{scenario.name}: metrics.kind = '{kind}' has no fitness and no r_min"])
+    names = [name for name, value in rows[0].items() if isinstance(value, (int, float))]
+    return {name: np.array([row[name] for row in rows], float) for name in names}
 
 
 COST = 0.05  # of fitness, at most
@@ -278,6 +512,7 @@ def harden(
     limit: str | Sequence[str] = (),
     threads: int | None = None,
     done: Callable[[], None] | None = None,
+    folder: str | os.PathLike[str] | None = None,
 ) -> list[StepResult]:
     """Make an optimum safer by the steps of Vásárhelyi et al. 2018, Table S4, as far as all constraints hold.
 
@@ -300,6 +535,8 @@ def harden(
         Flights side by side; by default one per core.
     done : callable, optional
         Called after each flight.
+    folder : str or path, optional
+        Folder that keeps every flight, in which a hardening that was interrupted goes on.
 
     Returns
     -------
@@ -324,14 +561,17 @@ def harden(
     """
     single = isinstance(scenario, (Scenario, str, os.PathLike))
     scenarios = [load_if_named(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
-    trial = HardeningCandidate(
-        scenarios,
-        recipe_parameters(scenarios[0], steps)[0],
-        seeds,
-        hardening_request(scenarios, cost, limit),
-        threads,
-        done,
-    )
+    work = Hardening(scenarios, seeds, steps, hardening_request(scenarios, cost, limit))
+    optimum = recipe_parameters(scenarios[0], steps)[0]
+    with run_folder(folder) as path:
+        open_folder(path, work)
+        executor = make_executor([ScenarioTask(each) for each in scenarios], threads=threads)
+        with open_run(path, executor, is_stored=folder is not None) as store:
+            return harden_in_steps(HardeningCandidate(work, optimum, store, executor, done), steps)
+
+
+def harden_in_steps(trial: HardeningCandidate, steps: Sequence[HardeningStep]) -> list[StepResult]:
+    """Try steps one after another, judge what is kept on fresh seeds; return all of them."""
     # Walls first if they are hit more often than agents: a step that widens distances drives agents
     # into walls.
     found = [trial.first]

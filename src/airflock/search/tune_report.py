@@ -21,10 +21,16 @@ from airflock.engine import driver_text
 from airflock.estimate import KEY_UNITS
 from airflock.runs import FlightStore, declared_numbers, with_parameters
 from airflock.scenarios import Scenario, step_counts, summary
-from airflock.search.hardening import MAX_FRESH_ROUNDS
 from airflock.search.limit_excess import limit_report_line
 from airflock.search.study_result import candidate_table
-from airflock.search.tune_stages import CERTIFICATE_FILE, PLAN_FILE, STUDY_FOLDER, TUNED_FILE, TuneResult, read_plan
+from airflock.search.tune_stages import (
+    CERTIFICATE_FILE,
+    CERTIFICATE_FOLDER,
+    HARDENING_FOLDER,
+    STUDY_FOLDER,
+    TUNED_FILE,
+    TuneResult,
+)
 from airflock.support import CardError, atomic
 from airflock.view import convergence, plot_certificate, print_settings
 
@@ -339,7 +345,8 @@ def _read(scenario: Scenario) -> set[str]:
 
 STAGES = {
     "search": "search", "race": "candidates that race for the final", "final": "final",
-    "again": "best finalists once more", "score": "fitness of the winner", COUNT_BATCH.stage: "certificate",
+    "again": "best finalists once more", "score": "fitness of the winner", "harden": "hardening",
+    COUNT_BATCH.stage: "certificate",
     "tolerance": "how far numbers may change",
 }  # fmt: skip
 BY_STAGE = "SELECT stage, count(*), min(seed), max(seed) FROM flight GROUP BY stage"
@@ -347,19 +354,8 @@ BY_STAGE = "SELECT stage, count(*), min(seed), max(seed) FROM flight GROUP BY st
 
 def flight_rows(result: TuneResult) -> list[tuple[str, str, str]]:
     """Return purpose, number of flights and their seeds, in the order of the stages."""
-    plan = read_plan(result.folder / PLAN_FILE)[0]
-    rows = _stored(result.folder / STUDY_FOLDER)
-    if result.steps:
-        tried, fresh = len(result.steps) - 1, plan.seeds * (1 + MAX_FRESH_ROUNDS)
-        rows.append(("hardening: sets that were tried", f"{tried * plan.seeds:,}", f"0 to {plan.seeds - 1}"))
-        rows.append(
-            (
-                "hardening: what was kept",
-                f"up to {MAX_FRESH_ROUNDS * plan.seeds:,} a set",
-                f"{plan.seeds} to {fresh - 1}",
-            )
-        )
-    return rows + _stored(result.folder / "certificate_flights")
+    folders = (STUDY_FOLDER, HARDENING_FOLDER, CERTIFICATE_FOLDER)
+    return [row for name in folders if (result.folder / name).is_dir() for row in _stored(result.folder / name)]
 
 
 def _stored(folder: Path) -> list[tuple[str, str, str]]:

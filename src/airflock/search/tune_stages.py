@@ -1,32 +1,19 @@
-"""Stages of a tuning: search, hardening, certificate; each is continued where it was left."""
+"""What a tuning is: its plan for a budget of time, its request, its progress and its result."""
 
-import itertools
-import json
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, fields
 from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from airflock import __version__
-from airflock.certificates import (
-    Certificate,
-    CountProgress as Counted,
-    campaign_executor,
-    campaign_from_request,
-    run_campaign as certified,
-    scenario_identity,
-)
-from airflock.runs import open_folder, read_toml_file, write_toml_file
-from airflock.scenarios import Scenario, formats, load
-from airflock.search.evolution import run_study as evolved, study_executor as searching
-from airflock.search.generations import SearchProgress as Searched
-from airflock.search.hardening import MAX_ROUNDS, harden, hardened_document as hardened_document
-from airflock.search.hardening_steps import StepResult
-from airflock.search.study import make_study
-from airflock.search.study_result import BEST_FILE, EvolveResult
-from airflock.support import ScenarioError, StudyError, as_error, atomic, parse_json_object, read_text
+from airflock.certificates import Certificate, scenario_identity
+from airflock.runs import REQUEST_FILE, read_request, write_toml_file
+from airflock.scenarios import Scenario, formats
+from airflock.search.hardening import StepResult
+from airflock.search.study_result import EvolveResult
+from airflock.support import StudyError, as_error
 
 SEARCH, HARDEN, CERTIFY_SHARE = 0.45, 0.15, 0.4  # shares of the budget
 TRIED = 15  # rounds of flights that hardening is planned with; all whole and half steps and fresh seeds would be 19
@@ -91,9 +78,24 @@ def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_lim
     return BudgetPlan(search, seeds, budget * CERTIFY_SHARE, rate)
 
 
-PLAN_FILE, START_FILE, STUDY_FOLDER, TUNED_FILE, CERTIFICATE_FILE, STEPS_FILE = (
-    "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
-)  # fmt: skip
+START_FILE, STUDY_FOLDER, TUNED_FILE, CERTIFICATE_FILE = "start.toml", "study", "tuned.toml", "certificate.toml"
+HARDENING_FOLDER, CERTIFICATE_FOLDER = "hardening_flights", "certificate_flights"
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """A tuning: everything that decides its result; `also` are notes on how its start was made."""
+
+    start: Scenario
+    plan: BudgetPlan
+    also: Mapping[str, Any]
+    kind: ClassVar[str] = "tuning"
+
+    def document(self) -> dict[str, Any]:
+        """Return the tuning as plain values: the request in its folder."""
+        scenario = {key: value for key, value in self.start.document.items() if key != "published"}
+        of = {"identity": scenario_identity(self.start), "name": self.start.name, "scenario": scenario}
+        return {**self.plan.document(), **of}
 
 
 @dataclass(frozen=True)
@@ -149,84 +151,35 @@ class TuneResult:
 MOST_SEEDS = 1_000_000  # of each step of hardening
 
 
-def load_plan(folder: Path, start: Scenario, resume: bool) -> BudgetPlan | None:
+def load_plan(folder: Path, start: Scenario, resume: bool | None) -> BudgetPlan | None:
     """Return the plan of a folder, or None if the folder is new. Raises StudyError for a folder of something else."""
-    if (folder / PLAN_FILE).is_file():
-        if not resume:
-            raise StudyError(f"{folder}: holds a tuning already; continue it with --resume, or give another --out")
-        made, of = read_plan(folder / PLAN_FILE)
-        if of != scenario_identity(start):
-            raise StudyError(f"{folder}: holds the tuning of another scenario; give another --out")
-        return made
-    if resume:
-        raise StudyError(f"{folder}: holds no tuning to resume ({PLAN_FILE} is missing)")
-    if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
-        raise StudyError(f"{folder}: is not empty and holds no {PLAN_FILE}; give a new folder")
-    return None
+    held = read_request(folder, Tuning.kind, resume=resume)
+    if held is None:
+        return None
+    if held.get("identity") != scenario_identity(start):
+        raise StudyError(f"{folder}: holds the tuning of another scenario; give another --out")
+    plan = read_plan(held, folder)
+    if "scenario" not in held:  # of a version whose request did not hold it
+        write_toml_file(folder / REQUEST_FILE, {"run": Tuning.kind, **Tuning(start, plan, {}).document()})
+    return plan
 
 
-def save_plan(folder: Path, start: Scenario, plan: BudgetPlan) -> None:
-    """Write the plan and where the tuning starts into a new folder."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_toml_file(folder / START_FILE, scenario_text_document(start), "Where tuning starts.")
-        write_toml_file(
-            folder / PLAN_FILE,
-            {**plan.document(), "identity": scenario_identity(start)},
-            "A tuning of Airflock. Written once, when it began.",
-        )
-    except OSError as error:
-        raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
-
-
-def read_plan(path: Path) -> tuple[BudgetPlan, str]:
-    """Read the plan of a folder and the identity of its scenario. Raises StudyError for a damaged file."""
-    found = read_toml_file(path)
-    try:
-        search = {str(key): value for key, value in found["search"].items()}
-        limits = [str(text) for text in found.get("limits", ())]
-        sure = float(found.get("confidence", DEFAULT_CONFIDENCE))
-        made = BudgetPlan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]), limits, sure)
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
-        raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from error
-    if found.get("margins"):  # of a version that could widen them
-        raise StudyError(f"{path}: margins are no longer widened; remove the line `margins` to go on without them")
-    if not (0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):
-        raise StudyError(f"{path}: is damaged: its numbers are no plan of a tuning; give another --out")
-    return made, str(found.get("identity"))
+def read_plan(held: Mapping[str, Any], where: object) -> BudgetPlan:
+    """Read the plan in the request of a tuning. Raises StudyError for a damaged one."""
+    with as_error(f"{where}: is damaged", StudyError):
+        made = BudgetPlan(**{each.name: held[each.name] for each in fields(BudgetPlan) if each.name in held})
+        numbers = made.seeds, made.seconds, made.rate, made.confidence
+        sound = all(isinstance(value, int | float) for value in numbers) and isinstance(made.search, dict)
+        if held.get("margins"):  # of a version that could widen them
+            raise StudyError(f"{where}: margins are no longer widened; remove the line `margins` to go on without them")
+        if not (sound and 0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):
+            raise StudyError(f"{where}: is damaged: its numbers are no plan of a tuning; give another --out")
+    return made
 
 
 def scenario_text_document(scenario: Scenario) -> dict[str, Any]:
     """Return the document of a scenario file without published values of a paper."""
     return {formats.KEY: formats.FORMAT, **{k: v for k, v in scenario.document.items() if k != "published"}}
-
-
-def read_steps(path: Path) -> tuple[list[StepResult], str]:
-    """Read the steps of hardening, and why there are none. Raises StudyError for a damaged file."""
-    with as_error(path, StudyError):
-        stored = parse_json_object(read_text(path))
-    try:
-        return [_measured(step) for step in stored["steps"]], str(stored["why"])
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
-        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from error
-
-
-def _measured(row: Mapping[str, Any]) -> StepResult:
-    """Make one step from plain values; errors of the constructors pass through."""
-
-    def three(values: Any) -> tuple[float, float, float]:
-        mean, low, high = map(float, values)
-        return mean, low, high
-
-    def table(name: str) -> dict[str, float]:
-        return {str(key): float(value) for key, value in row[name].items()}
-
-    return StepResult(
-        name=str(row["name"]), reason=str(row["reason"]), parameters=table("parameters"),
-        fitness=float(row["fitness"]), r_min=float(row["r_min"]), n_coll=float(row["n_coll"]),
-        cost=three(row["cost"]), gain=three(row["gain"]), parts=table("parts"), contacts=float(row["contacts"]),
-        clearance=float(row.get("clearance", "nan")), kept=bool(row["kept"]), verdict=str(row["verdict"]),
-    )  # fmt: skip
 
 
 PILOT = 4  # flights per core by which the time of one flight is measured
@@ -259,91 +212,3 @@ def measure_flight_rate(scenario: Scenario, threads: int | None) -> float:
     began = time.perf_counter()
     score_flights([scenario] * count, range(count), threads=threads)
     return count / max(time.perf_counter() - began, 1e-6)
-
-
-def run_search_stage(
-    folder: Path,
-    start: Scenario,
-    plan: BudgetPlan,
-    limits: Sequence[str],
-    threads: int | None,
-    on_progress: OnTuneProgress,
-) -> EvolveResult:
-    """Run or continue the search in the folder; return its result."""
-    on_progress(TuneProgress("search"))
-
-    def searched(p: Searched) -> None:
-        best = "" if p.best is None else f", best {p.best:.4f}"
-        on_progress(TuneProgress("search", f"generation {p.generation + 1}{best}", p.done, p.total))
-
-    objective = {"objective": {"limits": list(limits)}} if limits else {}
-    study = make_study(objective, start.name, search=plan.search, scenario=start)
-    open_folder(folder / STUDY_FOLDER, study)
-    return evolved(study, folder / STUDY_FOLDER, searching(study, threads=threads), searched)
-
-
-def run_hardening_stage(
-    folder: Path, plan: BudgetPlan, limits: Sequence[str], threads: int | None, trust: bool, on_progress: OnTuneProgress
-) -> tuple[Scenario, list[StepResult], str]:
-    """Harden or read the hardened set; return the scenario, its steps, and why there are none."""
-    # steps.json is written last: if it is there, the stage is complete.
-    if (folder / STEPS_FILE).is_file():
-        steps, why = read_steps(folder / STEPS_FILE)
-        return load(folder / TUNED_FILE, trust=trust), steps, why
-    best = load(folder / STUDY_FOLDER / BEST_FILE, trust=trust)
-    steps, why = [], ""
-    flown = itertools.count(1)
-    on_progress(TuneProgress("hardening"))
-
-    def done() -> None:
-        count = next(flown)
-        on_progress(TuneProgress("hardening", "", count, max(count, MAX_ROUNDS * plan.seeds)))
-
-    try:
-        steps = harden(best, range(plan.seeds), limit=limits, threads=threads, done=done)
-        write_toml_file(
-            folder / TUNED_FILE, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune."
-        )
-    except ScenarioError as error:
-        why = error.errors[0]
-        law = folder / STUDY_FOLDER / str(best.document.get("model", {}).get("kind", ""))
-        if law.suffix == ".py" and law.is_file():
-            atomic.write_file(folder / law.name, law.read_bytes())
-        write_toml_file(folder / TUNED_FILE, scenario_text_document(best), "Evolved by airflock tune; not hardened.")
-    outcome = {"why": why, "steps": [step.as_dict() for step in steps]}
-    atomic.write_file(folder / STEPS_FILE, json.dumps(outcome))
-    return load(folder / TUNED_FILE, trust=trust), steps, why
-
-
-def run_certificate_stage(
-    folder: Path,
-    tuned: Scenario,
-    limits: Sequence[str],
-    confidence: float,
-    plan: BudgetPlan,
-    threads: int | None,
-    on_progress: OnTuneProgress,
-) -> Certificate:
-    """Certify the tuned set; save the certificate in the folder and return it."""
-    on_progress(TuneProgress("certificate"))
-
-    def counted(p: Counted) -> None:
-        events = ", ".join(str(count) for count in p.events)
-        on_progress(TuneProgress("certificate", f"{events} events", p.done, p.total))
-
-    def follows(text: str) -> None:
-        on_progress(TuneProgress("certificate", text))
-
-    from airflock.certificates import used_and_unused_keys
-
-    campaign = campaign_from_request(tuned, limits, confidence)
-    path = folder / "certificate_flights"
-    open_folder(path, campaign)
-    executor = campaign_executor(campaign, threads=threads)
-    try:
-        keys = used_and_unused_keys(tuned)
-        made = certified(campaign, path, executor, plan.seconds, counted, keys=keys, threads=threads, notify=follows)
-    finally:
-        executor.close()
-    made.save(folder / CERTIFICATE_FILE)
-    return made

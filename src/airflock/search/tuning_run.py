@@ -4,6 +4,7 @@ Each stage is kept in the folder and continued where it was interrupted.
 """
 
 import hashlib
+import itertools
 import json
 import math
 import os
@@ -15,28 +16,46 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.certificates import COUNT_BUDGET_SHARE, Campaign, campaign_from_request, flights_to_show
+from airflock.certificates import (
+    COUNT_BUDGET_SHARE,
+    Campaign,
+    Certificate,
+    CountProgress,
+    campaign_from_request,
+    flights_to_show,
+    fly_campaign,
+    used_and_unused_keys,
+)
 from airflock.estimate import IdentifyResult, identify, read_heard
 from airflock.parts.metrics import scalar_names
-from airflock.runs import Interrupted, write_toml_file
+from airflock.runs import RESULT_FILE, Interrupted, held_request, open_folder, write_toml_file
 from airflock.scenarios import Scenario, build_scenario, load, rebuilt, scenario_variant, starting_set
+from airflock.search.evolution import run_study, study_executor
+from airflock.search.generations import SearchProgress
+from airflock.search.hardening import MAX_ROUNDS, StepResult, harden, hardened_document
 from airflock.search.limit_excess import flights_per_event
+from airflock.search.study import make_study
+from airflock.search.study_result import BEST_FILE, EvolveResult
 from airflock.search.study_space import default_space
 from airflock.search.tune_stages import (
+    CERTIFICATE_FILE,
+    CERTIFICATE_FOLDER,
     CERTIFY_SHARE,
     DEFAULT_CONFIDENCE,
+    HARDENING_FOLDER,
+    START_FILE,
+    STUDY_FOLDER,
+    TUNED_FILE,
     BudgetPlan,
     Notify,
     OnTuneProgress,
     TuneProgress,
     TuneResult,
+    Tuning,
     load_plan,
     make_plan,
     measure_flight_rate,
-    run_certificate_stage,
-    run_hardening_stage,
-    run_search_stage,
-    save_plan,
+    scenario_text_document,
 )
 from airflock.support import (
     ErrorCollector,
@@ -80,8 +99,7 @@ def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.Pa
     """
     request = _identify_request(logs, like, heard)
     if (folder / REPORT_FILE).is_file():
-        with as_error(folder / REPORT_FILE, StudyError):
-            report = parse_json_object(read_text(folder / REPORT_FILE))
+        report = read_report(folder)
         for key, value in request.items():
             if report.get(key) != value:
                 raise StudyError(f"{folder}: holds the tuning of other logs ({key} differs); give another --out")
@@ -92,6 +110,12 @@ def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.Pa
     return IdentifiedFleet(
         build_scenario(document, str(folder / SCENARIO)), document, {**request, **_identify_report(found)}
     )
+
+
+def read_report(folder: Path) -> dict[str, Any]:
+    """Read what the logs told, from the folder of a tuning. Raises StudyError for a damaged file."""
+    with as_error(folder / REPORT_FILE, StudyError):
+        return parse_json_object(read_text(folder / REPORT_FILE))
 
 
 def _identify_request(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
@@ -247,7 +271,7 @@ def _time(seconds: float) -> str:
 
 
 def tune(
-    scenario: Scenario | str | os.PathLike[str] | Paths,
+    scenario: Scenario | str | os.PathLike[str] | Paths | None,
     out: str | os.PathLike[str],
     *,
     budget: float = 1200.0,
@@ -267,9 +291,9 @@ def tune(
 
     Parameters
     ----------
-    scenario : Scenario, str or path, or a list of paths
+    scenario : Scenario, str or path, a list of paths, or None
         Your drones, field and speed; numbers of the law that it does not give are scaled to its speed. With `like`, log
-        files of your drones, as `airflock.identify` reads them.
+        files of your drones, as `airflock.identify` reads them. None continues what the folder holds.
     out : str or path
         Folder of everything: start, study, hardening, certificate, report, and tuned.toml to fly.
     budget : float
@@ -287,7 +311,7 @@ def tune(
     warm : bool
         Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
     resume : bool
-        Continue the work in the folder; limits and confidence that are not given are as in the first call.
+        Continue the work in the folder, which holds its start, plan, limits and confidence.
     settings : mapping, optional
         Keys of the scenario to change.
     threads : int, optional
@@ -323,20 +347,20 @@ def tune(
     parts.read(check_tune_budget, budget)
     if like is not None:
         parts.raise_errors()  # before logs are read, which takes long
-    begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
+    begun = parts.read(_begun, scenario, like, heard, settings, folder, resume, trust)
     # Each part that could be read is checked further, so that one message names all errors.
     start = parts.read(lambda found: found.start, begun)
     plan = parts.read(load_plan, folder, start, resume)
     request = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
     parts.raise_errors()
-    logs = begun.logs
-    sure, rated = request.campaign.confidence, [each for each in request.campaign.limits if each.rate is not None]
+    logs, sure = begun.logs, request.campaign.confidence
+    rated = [each for each in request.campaign.limits if each.rate is not None]
     if plan is None:
         telling = flights_per_event(rated, start)
-        made = make_plan(budget, measure_flight_rate(start, threads), warm=warm, flights_for_limits=telling)
-        plan = replace(made, limits=request.limits, confidence=sure)
-        save_plan(folder, start, plan)
-    searched = [each.text for each in rated]
+        plan = make_plan(budget, measure_flight_rate(start, threads), warm=warm, flights_for_limits=telling)
+    plan = replace(plan, limits=request.limits, confidence=sure)
+    open_folder(folder, Tuning(start, plan, {"notes": begun.notes}), resume=resume)
+    write_toml_file(folder / START_FILE, scenario_text_document(start), "Where tuning starts.")
     if logs is not None and not (folder / REPORT_FILE).is_file():
         logs.save(folder)
     short = infeasible_limit_lines(request.campaign, plan)
@@ -345,23 +369,92 @@ def tune(
             note(line)
     notes = [*begun.notes, *default_space(start)[1], *short]
     watch = watch or (lambda stage: None)
+    searched = [each.text for each in rated]
     try:
-        result = run_search_stage(folder, start, plan, searched, threads, watch)
+        result = search_set(folder / STUDY_FOLDER, start, plan.search, searched, threads, watch)
         if result.dead_reason:
             raise StudyError(f"{start.name}: {result.dead_reason}")
-        tuned, steps, why = run_hardening_stage(folder, plan, searched, threads, trust, watch)
-        shown = run_certificate_stage(folder, tuned, request.limits, sure, plan, threads, watch)
+        tuned, steps, why = harden_set(folder, plan.seeds, searched, threads, trust, watch)
+        shown = certify_set(folder, tuned, request.limits, plan, threads, watch)
         found = TuneResult(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
             {} if logs is None else logs.report,
         )  # fmt: skip
-        watch(TuneProgress("report"))
-        from airflock.search.tune_report import save
+        if not (folder / RESULT_FILE).is_file():
+            watch(TuneProgress("report"))
+            from airflock.search.tune_report import save
 
-        save(found)
+            save(found)
+            write_toml_file(folder / RESULT_FILE, found.document(), "What airflock tune found.")
     except KeyboardInterrupt as stop:
-        raise Interrupted(f"interrupted: stages that are over are kept in {folder}; continue with --resume") from stop
+        raise Interrupted(f"interrupted: all flights so far are kept in {folder}; continue with --resume") from stop
     return found
+
+
+def search_set(
+    folder: Path, start: Scenario, search: Mapping[str, Any], limits: Sequence[str], threads: int | None,
+    watch: OnTuneProgress,
+) -> EvolveResult:  # fmt: skip
+    """Begin or continue the search in its folder; return its result."""
+    watch(TuneProgress("search"))
+
+    def searched(p: SearchProgress) -> None:
+        best = "" if p.best is None else f", best {p.best:.4f}"
+        watch(TuneProgress("search", f"generation {p.generation + 1}{best}", p.done, p.total))
+
+    objective = {"objective": {"limits": list(limits)}} if limits else {}
+    study = make_study(objective, start.name, search=search, scenario=start)
+    open_folder(folder, study)
+    return run_study(study, folder, study_executor(study, threads=threads), searched)
+
+
+def harden_set(
+    folder: Path, seeds: int, limits: Sequence[str], threads: int | None, trust: bool, watch: OnTuneProgress
+) -> tuple[Scenario, list[StepResult], str]:
+    """Harden the set that the search found; return it as tuned.toml holds it, its steps, and why there are none."""
+    best = load(folder / STUDY_FOLDER / BEST_FILE, trust=trust)
+    flown = itertools.count(1)
+    watch(TuneProgress("hardening"))
+
+    def done() -> None:
+        count = next(flown)
+        watch(TuneProgress("hardening", "", count, max(count, MAX_ROUNDS * seeds)))
+
+    steps, why = [], ""
+    try:
+        steps = harden(best, range(seeds), limit=limits, threads=threads, done=done, folder=folder / HARDENING_FOLDER)
+        document, comment = hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune."
+    except ScenarioError as error:
+        why = error.errors[0]
+        document, comment = scenario_text_document(best), "Evolved by airflock tune; not hardened."
+        law = folder / STUDY_FOLDER / str(best.document.get("model", {}).get("kind", ""))
+        if law.suffix == ".py" and law.is_file():
+            atomic.write_file(folder / law.name, law.read_bytes())
+    write_toml_file(folder / TUNED_FILE, document, comment)
+    return load(folder / TUNED_FILE, trust=trust), steps, why
+
+
+def certify_set(
+    folder: Path, tuned: Scenario, limits: Sequence[str], plan: BudgetPlan, threads: int | None, watch: OnTuneProgress
+) -> Certificate:
+    """Certify the tuned set; save the certificate in the folder and return it."""
+    watch(TuneProgress("certificate"))
+
+    def counted(p: CountProgress) -> None:
+        events = ", ".join(str(count) for count in p.events)
+        watch(TuneProgress("certificate", f"{events} events", p.done, p.total))
+
+    def follows(text: str) -> None:
+        watch(TuneProgress("certificate", text))
+
+    place = folder / CERTIFICATE_FOLDER
+    made = fly_campaign(
+        campaign_from_request(tuned, limits, plan.confidence), place,
+        None if (place / RESULT_FILE).is_file() else plan.seconds, counted, follows,
+        keys=used_and_unused_keys(tuned), threads=threads,
+    )  # fmt: skip
+    made.save(folder / CERTIFICATE_FILE)
+    return made
 
 
 class _Begun(NamedTuple):
@@ -373,13 +466,23 @@ class _Begun(NamedTuple):
 
 
 def _begun(
-    what: Scenario | str | os.PathLike[str] | Paths,
+    what: Scenario | str | os.PathLike[str] | Paths | None,
     like: Scenario | str | os.PathLike[str] | None,
     heard: str | os.PathLike[str] | None,
     settings: Mapping[str, Any] | None,
     folder: Path,
+    resume: bool,
     trust: bool,
 ) -> _Begun:
+    if what is None:
+        held = held_request(folder if resume else None, Tuning.kind, {"like": like, "heard": heard, "set": settings})
+        with as_error(folder, StudyError):
+            if "scenario" not in held:
+                raise StudyError(f"{folder}: was begun by an older version; name its scenario again")
+            name, notes = str(held["name"]), list(held.get("also", {}).get("notes", []))
+            start = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
+        report = read_report(folder) if (folder / REPORT_FILE).is_file() else None
+        return _Begun(start, notes, None if report is None else IdentifiedFleet(start, {}, report))
     paths = [what] if isinstance(what, (Scenario, str, os.PathLike)) else list(what)
     if like is None:
         if len(paths) != 1 or heard is not None:
