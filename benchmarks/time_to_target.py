@@ -99,7 +99,7 @@ def searched(what, seed, folder):
 def curve(what, seed, folder):
     """(whole flights, difference to Table S1 at coarse steps) of the average of a search's means so far."""
     study, points, means, cost = study_of(what, seed), [], [], 0.0
-    state = make_optimiser("cmaes", len(study.space.axes), 1, study.population(0), study.whole("seed") << 16)
+    state = make_optimiser("cmaes", len(study.space.axes), 1, study.whole("population"), study.whole("seed") << 16)
     seeds = [CURVE_FIRST + i for i in range(CURVE)]
     known = fitness(study.scenario, seeds)
     with FlightStore(folder, write=False) as store:

@@ -193,10 +193,7 @@ def test_a_study_without_limits_is_what_it_was_and_one_with_them_says_so():
         ({"limits": ["r_mim<3 at 1%"]}, {}, "unknown order parameter; did you mean r_min"),
         ({"limits": 3}, {}, "objective.limits = 3 is neither a limit nor a list of limits"),
         ({"limit": NEAR}, {}, "objective.limit: unknown key; did you mean objective.limits"),
-        (
-            {"limits": NEAR}, {"seeds": 4, "racing": "optimistic", "random_numbers": "generation"},
-            "search.racing compares fitness and knows no limits",
-        ),
+        ({"limits": NEAR}, {"racing": "optimistic"}, "search.racing: unknown key"),
         ({"limits": NEAR}, {"reserve": 0.5}, r"search.reserve = 0.5 lies outside \[1, 1e\+06\]"),
     ],
 )  # fmt: skip

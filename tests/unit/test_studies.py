@@ -1,6 +1,7 @@
 """Studies: their folders, their bad input, their results, all with flights that cost nothing."""
 
 import json
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -16,8 +17,15 @@ import airflock
 import toys
 from airflock.runs.executors import BatchExecutor, Flight, ThreadExecutor
 from airflock.runs.flight_store import FILE, CandidateBatch, FlightStore
-from airflock.runs.folder import Interrupted, differences, open_folder
-from airflock.runs.search_space import with_parameters
+from airflock.runs.folder import (
+    REQUEST_FILE,
+    Interrupted,
+    differences,
+    open_folder,
+    read_request,
+    write_toml_file,
+)
+from airflock.runs.search_space import SearchAxis, with_parameters
 from airflock.search.evolution import (
     check_study_device,
     evolve_request,
@@ -323,10 +331,9 @@ def test_every_shipped_study_can_be_begun(name):
     assert all(axis.low < axis.high for axis in study.space.axes) and study.title
 
 
-@pytest.mark.parametrize(("search", "odd"), [({"population": 7}, 7), ({"restarts": 1, "growth": 1.5}, 75)])
-def test_pairs_of_parents_are_asked_for_before_a_study_begins(search, odd):
-    with pytest.raises(ScenarioError, match=f"search.population = {odd}.* is odd"):
-        load_study("dimock_2003/published", search=search)
+def test_pairs_of_parents_are_asked_for_before_a_study_begins():
+    with pytest.raises(ScenarioError, match="search.population = 7 is odd"):
+        load_study("dimock_2003/published", search={"population": 7})
 
 
 def test_the_study_of_dimock_2003_searches_the_bounds_of_the_paper_with_cohesion_reaching_farther():
@@ -378,3 +385,66 @@ def test_a_study_of_another_device_is_another_study():
     assert differences(toys.study().document(), replace(toys.study(), device="cuda").document()) == [
         "device = cpu there, cuda now"
     ]
+
+
+def test_folders_of_before_there_was_one_format_go_on(tmp_path, done):
+    """The request had another name for each kind of run, and keys of the search that did nothing."""
+    folder = tmp_path / "old"
+    shutil.copytree(done.folder, folder)
+    held = read_request(folder, "study")
+    held["search"] |= {"racing": "none", "growth": 1}
+    (folder / REQUEST_FILE).unlink()
+    write_toml_file(folder / "study.toml", held)
+    open_folder(folder, toys.study(population=16, generations=25, restarts=1), resume=True)
+    with pytest.raises(StudyError, match="holds a study and no campaign"):
+        read_request(folder, "campaign")
+    write_toml_file(folder / "study.toml", {**held, "search": {**held["search"], "racing": "optimistic"}})
+    with pytest.raises(StudyError, match="holds another study: search.racing = optimistic there, missing now"):
+        open_folder(folder, toys.study(population=16, generations=25, restarts=1), resume=True)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_study_from_its_folder_alone_is_the_same_to_the_bit(tmp_path):
+    """Axes whose order a file cannot keep, a tie, a fitness of one's own in a file, two scenarios, limits."""
+    (tmp_path / "mine.py").write_text("def hurry(score):\n    return 2.0 * score['phi_vel']\n")
+    (tmp_path / "two.toml").write_text(
+        'scenarios = ["vasarhelyi_2018/4ms", { scenario = "vasarhelyi_2018/4ms", set = { "radio.delay" = 0.5 } }]\n'
+        '[set]\nagents = 4\n[objective]\nmaximise = "hurry"\nown = "mine.py"\nlimits = ["r_min<3 at 1%"]\n'
+        "[space.model]\np_rep = { low = 0.1, high = 0.2 }\nr0_rep = { low = 5.0, high = 20.0, above = 'model.r0_shill' }\n"
+        "r0_shill = { low = 0.0, high = 1.0 }\nv_frict = { tied = 'model.p_rep', factor = 2.0 }\n"
+        "[search]\npopulation = 4\ngenerations = 2\n"
+    )
+    study = load_study(tmp_path / "two.toml", trust=True)
+    axes = [*study.space.axes, SearchAxis("duration", "s", 10.0, 20.0), SearchAxis("radio.delay", "s", 0.1, 0.2)]
+    study = replace(study, space=replace(study.space, axes=(axes[3], axes[1], axes[4], axes[0], axes[2])))
+    open_folder(tmp_path / "a", study, resume=False)
+    found, _ = evolve_request(None, folder=tmp_path / "a", trust=True)
+    assert found.document() == study.document() and found.space == study.space and found.labels == study.labels
+    assert found.objectives[0].of_candidate([{"phi_vel": 3.0}]) == 6.0
+    open_folder(tmp_path / "a", found, resume=True)
+    with pytest.raises(ScenarioError, match="would run the code in"):
+        evolve_request(None, folder=tmp_path / "a")
+
+
+def test_a_function_as_fitness_has_to_be_given_to_a_folder_again(tmp_path):
+    def quick(score):
+        return score["phi_vel"]
+
+    study = study_from_request("vasarhelyi_2018/4ms", fitness=quick)
+    open_folder(tmp_path / "a", study, resume=False)
+    with pytest.raises(StudyError, match="its fitness is a function of your own; give it again"):
+        evolve_request(None, folder=tmp_path / "a")
+    assert evolve_request(None, folder=tmp_path / "a", fitness=quick)[0].document() == study.document()
+    with pytest.raises(StudyError, match="no scenario and no folder to resume"):
+        evolve_request(None)
+
+
+def test_a_finished_study_flies_and_draws_nothing_more(tmp_path, done):
+    folder = tmp_path / "a"
+    shutil.copytree(done.folder, folder)
+    before = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix in (".csv", ".png")}
+    study = toys.study(population=16, generations=25, restarts=1)
+    open_folder(folder, study, resume=True)
+    again = run_study(study, folder, ThreadExecutor(lambda *_: pytest.fail("flown"), 1))
+    assert again.document() == done.document()
+    assert {name: (folder / name).read_bytes() for name in before} == before

@@ -24,7 +24,7 @@ LOAD_OPTIONS = {"changes": "airflock.load(name, settings)", "agents": "airflock.
 LOAD_OPTIONS |= {"law": "airflock.load", "trust": "airflock.load"}
 JSON_OPTIONS = {"as_json": "the value returned"}
 SEARCH_OPTIONS = (
-    "algorithm", "population", "generations", "seeds", "seed", "restarts", "flights", "racing", "start", "averages",
+    "algorithm", "population", "generations", "seeds", "seed", "restarts", "flights", "start", "averages",
 )  # fmt: skip
 SEED_OPTIONS = {"seeds": "seeds", "first_seed": "seeds"}
 FLIGHT_OPTIONS = {"threads": "threads", "precision": "precision", "device": "device"}

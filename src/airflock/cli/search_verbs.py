@@ -49,12 +49,6 @@ def evolve(
             show_default="whole",
         ),
     ] = None,
-    racing: Annotated[
-        bool,
-        typer.Option(
-            "--racing", help="With several --seeds: stop flying a candidate once it cannot reach the better half."
-        ),
-    ] = False,
     start: Annotated[
         str | None,
         typer.Option(
@@ -117,7 +111,6 @@ def evolve(
         "seed": seed,
         "restarts": restarts,
         "flights": flights,
-        **({"racing": "optimistic", "random_numbers": "generation"} if racing else {}),
         "start": start,
         "averages": averages,
     }

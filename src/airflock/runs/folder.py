@@ -24,7 +24,7 @@ from airflock.support import StudyError, as_error, atomic, expand_path, processo
 REQUEST_FILE, RESULT_FILE = "request.toml", "result.toml"
 # names of the request in folders from before all runs had one format
 OLD_FILES = {"study.toml": "study", "campaign.toml": "campaign", "tune.toml": "tuning"}
-GONE: Mapping[str, Any] = {}  # keys of the search in older folders → the value at which they did nothing
+GONE = {"racing": "none", "growth": 1}  # keys of the search in older folders → the value at which they did nothing
 PACKAGES = ("numpy", "numba", "cma", "pymoo")
 FITNESS_TEXT = re.compile(r"objective\[\d+\]\.own = ")  # a difference of two studies that may go on in one folder
 OF_PROGRAM = ("layout", "airflock", "rules")  # keys that no option sets

@@ -165,7 +165,7 @@ def resolve_device(study: Study, device: str) -> Study:
         return study
     from airflock.engine import pick_device
 
-    generation = [study.scenario] * study.population(0) * study.whole("seeds")
+    generation = [study.scenario] * study.whole("population") * study.whole("seeds")
     return replace(study, device=pick_device(generation, device, precision=int(study.search.precision)))
 
 

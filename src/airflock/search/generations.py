@@ -45,14 +45,12 @@ class Evaluator:
         *,
         seeds: Sequence[Sequence[int]] | None = None,
         duration_share: float = 1.0,
-        racing: bool = False,
     ) -> list[list[float | None]]:
         """Return the fitness (candidate, objective) of a batch; fly and store missing flights. None: failed.
 
         points : (candidate, axis) of the unit cube
         seeds  : (candidate, repeat); by default those of the search
         duration_share : share of the scenarios' duration that is flown
-        racing : True flies one seed after another and drops candidates that cannot reach the better half
         """
         study = self.study
         parameters = [study.space.parameters(point) for point in points]
@@ -63,28 +61,18 @@ class Evaluator:
         if self.note:
             for _ in flown:
                 self.note(False)
-        n, last = len(places), max(len(row) for row in numbers)
-        alive = list(range(len(parameters)))
-        # A race flies one more seed of each remaining candidate in each pass; otherwise one pass
-        # flies all seeds.
-        for seen in range(1, last + 1) if racing else [last]:
-            missing = [
-                # One number holds seed and scenario, so that the scenarios of a seed lie side by
-                # side in the store.
-                Flight(i, j * n + k, {**parameters[i], **shorter}, seed, k)
-                for i in alive
-                for j, seed in enumerate(numbers[i][:seen])
-                for k, shorter in enumerate(places)
-                if (i, j * n + k) not in flown
-            ]
-            self._fly(batch, missing, flown)
-            if seen < last:
-                alive = self._still_needed(flown, alive, seen, last)
+        n = len(places)
+        missing = [
+            # One number holds seed and scenario, so that the scenarios of a seed lie side by side in the store.
+            Flight(i, j * n + k, {**parameters[i], **shorter}, seed, k)
+            for i in range(len(parameters))
+            for j, seed in enumerate(numbers[i])
+            for k, shorter in enumerate(places)
+            if (i, j * n + k) not in flown
+        ]
+        self._fly(batch, missing, flown)
         rows = [
-            [
-                self._fitness(objective, [flown[i, r] for r in range(len(row) * n) if (i, r) in flown])
-                for objective in study.objectives
-            ]
+            [self._fitness(objective, [flown[i, r] for r in range(len(row) * n)]) for objective in study.objectives]
             for i, row in enumerate(numbers)
         ]
         self.store.tell(batch, rows)
@@ -114,22 +102,6 @@ class Evaluator:
             lines += [line] if line else []
         return "; ".join(lines)
 
-    def _still_needed(self, flown: FlightScores, alive: Sequence[int], seen: int, last: int) -> list[int]:
-        """Return the candidates that fly on after `seen` of `last` seeds."""
-        # Stored flights of later seeds must not count: a resumed search would decide with more than
-        # the first.
-        first, n = self.study.objectives[0], len(self.study.scenarios)
-        candidates = 1 + max(i for i, _ in flown)
-        values = [
-            [
-                self._fitness(first, [flown[i, j * n + k] for k in range(n)])
-                for j in range(seen)
-                if all((i, j * n + k) in flown for k in range(n))
-            ]
-            for i in range(candidates)
-        ]
-        return remaining_candidates(values, alive, last - seen, first.maximise)
-
     def _fitness(self, objective: Objective, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
         """Return the fitness of a candidate: over the seeds of each scenario, then over the scenarios."""
         n = len(self.study.scenarios)
@@ -146,41 +118,12 @@ def _seeds(study: Study, batch: CandidateBatch, candidates: int) -> list[list[in
     """Return the seeds (candidate, repeat) of a generation of the search."""
     # Seeds follow from the place in the search alone, so that a resumed search flies the same ones.
     k, most = study.seeds(batch.generation), max(study.whole("seeds"), study.whole("late_seeds"))
-    before = sum(study.population(run) for run in range(batch.run)) * study.whole("generations")
-    # All runs before this one may have had another population: restarts grow it.
-    first = before + batch.generation * study.population(batch.run)
+    population = study.whole("population")
+    first = (batch.run * study.whole("generations") + batch.generation) * population
     how = study.search.random_numbers
     return [
         [study.seed(0, most * {"fresh": first + i, "generation": first, "study": 0}[how] + j) for j in range(k)]
         for i in range(candidates)
-    ]
-
-
-SeedValues = Sequence[float | None]
-
-
-def remaining_candidates(
-    values: Sequence[SeedValues], remaining: Sequence[int], seeds_left: int, maximise: bool
-) -> list[int]:
-    """Return the remaining candidates that fly on.
-
-    values : (candidate, seed so far) of all candidates of the generation; None: failed, which ends a candidate
-    seeds_left : seeds that are still to come
-    """
-    # CMA-ES moves by the better half, so only candidates that cannot reach it even with best luck
-    # are dropped.
-    sign = 1.0 if maximise else -1.0
-    scored = [[sign * value for value in row if value is not None] for row in values]
-    failed = [len(row) < len(given) for row, given in zip(scored, values, strict=True)]
-    means = [
-        -float("inf") if lost or not row else sum(row) / len(row) for row, lost in zip(scored, failed, strict=True)
-    ]
-    best = max((value for row in scored for value in row), default=0.0)
-    needed = sorted(means, reverse=True)[(len(means) + 1) // 2 - 1]
-    return [
-        i
-        for i in remaining
-        if not failed[i] and (sum(scored[i]) + seeds_left * best) / (len(scored[i]) + seeds_left) >= needed
     ]
 
 
@@ -354,9 +297,9 @@ class ProgressTally:
 
 def total_flights(study: Study) -> int:
     """Return the number of flights of the whole search."""
-    runs = range(study.whole("restarts") + 1)
+    candidates = (study.whole("restarts") + 1) * study.whole("population")
     each = sum(study.seeds(generation) for generation in range(study.whole("generations")))
-    return sum(study.population(run) for run in runs) * each * len(study.scenarios)
+    return candidates * each * len(study.scenarios)
 
 
 def run_search(
@@ -385,7 +328,7 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
     study, store = evaluator.study, evaluator.store
     first = study.objectives[0]
     state = make_optimiser(
-        study.search.algorithm, len(study.space.axes), len(study.objectives), study.population(run),
+        study.search.algorithm, len(study.space.axes), len(study.objectives), study.whole("population"),
         (study.whole("seed") << 16) + run, spread=study.search.spread, start=_start(study),
     )  # fmt: skip
     length = FlightLength(study.whole("generations"), first.maximise, growing=study.search.flights == "growing")
@@ -396,11 +339,7 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
         tally.run, tally.generation = run, generation
         batch = CandidateBatch("search", run, generation)
         points = _asked(store, batch, state.ask())
-        begun = tally.done
-        racing = study.search.racing == "optimistic"
-        rows = evaluator.evaluate(batch, points, duration_share=length.share, racing=racing)
-        # A race flies fewer flights than planned: the total shrinks by those that it saved.
-        tally.total -= len(points) * study.seeds(generation) * len(study.scenarios) - (tally.done - begun)
+        rows = evaluator.evaluate(batch, points, duration_share=length.share)
         values, losses = [row[0] for row in rows], candidate_losses(rows, study.objectives)
         sound = values
         if study.limits:

@@ -61,22 +61,8 @@ class SearchSettings(Record):
         source="our choice",
         meaning="flights' seeds: new for each candidate, common to a generation, or common to the whole study",
     )
-    racing: str = choice(
-        "none",
-        ("none", "optimistic"),
-        source="our choice, after benchmarks/racing.py",
-        meaning="whether candidates of several seeds that cannot reach the better half of a generation fly on",
-    )
     restarts: float = quantity(
         0, "1", low=0, high=1000, source="our choice", meaning="further independent runs after the first"
-    )
-    growth: float = quantity(
-        1.0,
-        "1",
-        low=1.0,
-        high=16.0,
-        source="our choice; Auger & Hansen 2005 take 2",
-        meaning="factor by which each restart enlarges the population",
     )
     flights: str = choice(
         "whole",
@@ -148,7 +134,7 @@ class SearchSettings(Record):
     )
 
 
-BROKEN = ("growth", "spread", "reserve")  # numbers that need not be whole
+BROKEN = ("spread", "reserve")  # numbers that need not be whole
 WHOLE = tuple(
     n for n, declared, _ in declarations(SearchSettings()) if isinstance(declared, Quantity) and n not in BROKEN
 )
@@ -158,7 +144,6 @@ def search_errors(
     search: SearchSettings,
     objectives: Sequence[Objective],
     space: SearchSpace | None,
-    over_scenarios: str,
     *,
     limits: bool = False,
 ) -> list[str]:
@@ -182,9 +167,7 @@ def search_errors(
             f"search.algorithm = '{search.algorithm}' takes one objective, but there are {len(objectives)}; "
             f"give one, or search.algorithm = '{MULTI_OBJECTIVE}'"
         )
-    errors += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
-    if limits and search.racing != "none":
-        errors.append("search.racing compares fitness and knows no limits; leave out objective.limits or search.racing")
+    errors += _only_cmaes(search)
     if search.again and (limits or len(objectives) > 1):
         errors.append("search.again compares one fitness; leave it at 0 with limits or several objectives")
     if search.flights == "growing":
@@ -195,12 +178,11 @@ def search_errors(
             )
         if space is not None and "duration" in {*space.keys, *space.fixed, *space.tied}:
             errors.append("search.flights = 'growing' sets the duration, which the space does, too; leave out one")
-    populations = [round(search.population * search.growth**run) for run in range(min(int(search.restarts), 20) + 1)]
-    odd = [population for population in populations if population % 2]
-    if search.algorithm == "ga" and odd:
-        grown = "" if odd[0] == populations[0] else " after restarts that enlarge it"
-        errors.append(f"search.population = {odd[0]}{grown} is odd: in algorithm ga two parents have two children")
-    flights = search.population * search.growth**search.restarts * search.generations * (search.restarts + 1.0)
+    if search.algorithm == "ga" and search.population % 2:
+        errors.append(
+            f"search.population = {search.population:g} is odd: in algorithm ga two parents have two children"
+        )
+    flights = search.population * search.generations * (search.restarts + 1.0)
     flights *= max(search.seeds, search.late_seeds)
     if flights >= 2 ** (SEED_BITS - 4):
         errors.append(f"search: {flights:g} flights are more than a study can number")
@@ -212,23 +194,9 @@ def _only_cmaes(search: SearchSettings) -> list[str]:
     if search.algorithm == "cmaes":
         return []
     usual, found = SearchSettings(), []
-    for name in ("flights", "racing", "start", "spread", "averages", "windows"):
+    for name in ("flights", "start", "spread", "averages", "windows"):
         value = getattr(search, name)
         if value != getattr(usual, name):
             shown = repr(value) if isinstance(value, str) else f"{value:g}"
             found.append(f"search.{name} = {shown} is for algorithm cmaes, but search.algorithm = '{search.algorithm}'")
     return found
-
-
-def _racing_faults(search: SearchSettings, objectives: Sequence[Objective], over_scenarios: str) -> list[str]:
-    """Why candidates of this search cannot race."""
-    if search.racing == "none":
-        return []
-    errors = []
-    if search.seeds < 2:
-        errors.append("search.racing needs at least 2 flights of a candidate; give search.seeds = 4, for instance")
-    if search.random_numbers == "fresh":
-        errors.append("search.racing needs common seeds; give search.random_numbers = 'generation'")
-    if any(objective.over_seeds != "mean" for objective in objectives) or over_scenarios != "mean":
-        errors.append("search.racing compares means; leave over_seeds and over_scenarios at 'mean'")
-    return errors

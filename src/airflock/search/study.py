@@ -81,10 +81,6 @@ class Study:
         """Return a setting of the search as a whole number."""
         return int(getattr(self.search, name))
 
-    def population(self, run: int) -> int:
-        """Return the candidates of a generation in a run; restarts may enlarge it."""
-        return round(self.search.population * self.search.growth**run)
-
     def seeds(self, generation: int) -> int:
         """Return the flights of a candidate in a generation: from `seeds` up to `late_seeds` in equal ratios."""
         first, last = self.search.seeds, self.search.late_seeds
@@ -302,7 +298,7 @@ def make_study(
         # One flight has no spread, and limits are judged by the spread of flights.
         if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
             found = replace(found, seeds=2.0)
-        errors += search_errors(found, objectives, space, str(over), limits=bool(kept))
+        errors += search_errors(found, objectives, space, limits=bool(kept))
     if errors or space is None or found is None:
         raise ScenarioError([f"{where}: {error}" for error in errors])
     return Study(
