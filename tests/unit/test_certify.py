@@ -24,6 +24,7 @@ from airflock.certificates.limits import parse_limit, parse_limits, rate_per_hou
 from airflock.cli.main import app
 from airflock.engine import score_flights
 from airflock.runs.executors import FlightResult, ThreadExecutor
+from airflock.runs.flight_store import FlightStore
 from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
@@ -115,7 +116,7 @@ def test_flights_of_a_folder_that_does_not_stay_are_not_said_to_be_kept(tmp_path
 
 def test_a_folder_of_another_campaign_is_refused(tmp_path):
     flown(campaign(), tmp_path / "a", 0.0)
-    with pytest.raises(StudyError, match="already holds this campaign; continue it with --resume"):
+    with pytest.raises(StudyError, match="already holds a campaign; continue it with --resume"):
         flown(campaign(), tmp_path / "a", 0.0)
     with pytest.raises(StudyError, match="holds another campaign: confidence = 0.95 there, 0.9 now"):
         flown(campaign(confidence=0.9), tmp_path / "a", 0.0, resume=True)
@@ -194,6 +195,7 @@ def test_each_number_has_its_share_of_the_time_that_is_left_and_compiling_takes_
     class Kept:
         flown = staticmethod(lambda _: {})
         land = staticmethod(lambda *_: None)
+        fly = FlightStore.fly
 
     screen = ValueScreen(CampaignFlyer(campaign(), Kept(), Executor(), until=80.0), 0.02)
     screen.share_time(4)

@@ -410,7 +410,8 @@ def test_a_study_from_its_folder_alone_is_the_same_to_the_bit(tmp_path):
     (tmp_path / "two.toml").write_text(
         'scenarios = ["vasarhelyi_2018/4ms", { scenario = "vasarhelyi_2018/4ms", set = { "radio.delay" = 0.5 } }]\n'
         '[set]\nagents = 4\n[objective]\nmaximise = "hurry"\nown = "mine.py"\nlimits = ["r_min<3 at 1%"]\n'
-        "[space.model]\np_rep = { low = 0.1, high = 0.2 }\nr0_rep = { low = 5.0, high = 20.0, above = 'model.r0_shill' }\n"
+        "[space.model]\np_rep = { low = 0.1, high = 0.2 }\n"
+        "r0_rep = { low = 5.0, high = 20.0, above = 'model.r0_shill' }\n"
         "r0_shill = { low = 0.0, high = 1.0 }\nv_frict = { tied = 'model.p_rep', factor = 2.0 }\n"
         "[search]\npopulation = 4\ngenerations = 2\n"
     )

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.runs import open_folder
-from airflock.search import EvolveResult, SearchProgress, load_study, run_study, study_executor
+from airflock.runs import RunProgress, open_folder
+from airflock.search import EvolveResult, load_study, run_study, study_executor
 from airflock.support import cache_folder
 from airflock_papers.flights import Flights
 
@@ -40,7 +40,7 @@ def evolve(
     place = folder_of(folder or name, number, flights.quick)
     open_folder(place, study)
 
-    def watch(p: SearchProgress) -> None:
+    def watch(p: RunProgress) -> None:
         if flights.progress:
             flights.progress(title, p.done, p.total)
 

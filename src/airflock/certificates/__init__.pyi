@@ -23,7 +23,6 @@ from .certification import (
 )
 from .counting import (
     COUNT_BATCH as COUNT_BATCH,
-    CountProgress as CountProgress,
     flights_to_show as flights_to_show,
 )
 from .limits import (

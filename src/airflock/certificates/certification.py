@@ -3,7 +3,7 @@
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product, takewhile
 from pathlib import Path
@@ -25,7 +25,7 @@ from airflock.certificates.campaign import (
     worse_direction,
 )
 from airflock.certificates.certificate import Certificate, EventTiming, event_timing
-from airflock.certificates.counting import CampaignFlyer, CountResult, OnCountProgress, count_events
+from airflock.certificates.counting import CampaignFlyer, CountResult, count_events
 from airflock.certificates.limits import InterimLook, alpha_share, flights_needed, look_schedule, take_look
 from airflock.certificates.splitting import check_split
 from airflock.core import Quantity
@@ -34,6 +34,7 @@ from airflock.runs import (
     CandidateBatch,
     Executor,
     Flight,
+    OnProgress,
     declared_numbers,
     held_request,
     make_executor,
@@ -295,7 +296,7 @@ def certify(
     scheduler: str | None = None,
     threads: int | None = None,
     timeout: float | None = None,
-    watch: OnCountProgress | None = None,
+    watch: OnProgress | None = None,
     trust: bool = False,
 ) -> Certificate:
     """Show by counting that an event is rare: exact bounds that hold over all looks, seeds fixed by the scenario.
@@ -406,8 +407,7 @@ def fly_campaign(
     campaign: Campaign,
     folder: str | os.PathLike[str] | None,
     budget: float | None = None,
-    on_progress: OnCountProgress | None = None,
-    notify: Callable[[str], None] | None = None,
+    on_progress: OnProgress | None = None,
     *,
     resume: bool | None = None,
     keys: Sequence[str] = (),
@@ -433,7 +433,7 @@ def fly_campaign(
             open_folder(path, campaign, resume=resume, also={key: value for key, value in extras.items() if value})
             return run_campaign(
                 campaign, path, executor, budget, on_progress, keys=keys, split=split, axes=axes, threads=threads,
-                notify=notify, is_stored=folder is not None,
+                is_stored=folder is not None,
             )  # fmt: skip
         finally:
             executor.close()
@@ -444,18 +444,16 @@ def run_campaign(
     folder: Path,
     executor: Executor,
     budget: float,
-    on_progress: OnCountProgress | None = None,
+    on_progress: OnProgress | None = None,
     *,
     keys: Sequence[str] = (),
     split: bool = False,
     axes: Mapping[str, Sequence[float]] | None = None,
     threads: int | None = None,
-    notify: Callable[[str], None] | None = None,
     is_stored: bool = True,
 ) -> Certificate:
     """Count, find tolerances of `keys`, split, and map over `axes`, in a folder that `open_folder` has accepted.
 
-    notify    : called with a few words as each part begins
     is_stored : True if the folder stays
     """
     began = time.monotonic()
@@ -466,10 +464,10 @@ def run_campaign(
 
     with open_run(folder, executor, is_stored=is_stored) as store:
         write_toml_file(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
-        flyer = CampaignFlyer(campaign, store, executor, note=notify)
+        flyer = CampaignFlyer(campaign, store, executor, watch=on_progress)
         # Counting first, with its share: splitting and tolerances start from its flights.
         part = COUNT_BUDGET_SHARE if keys or split or axes else 1.0
-        counted = count_events(flyer if campaign.flights else flyer.with_budget(budget * part), on_progress)
+        counted = count_events(flyer if campaign.flights else flyer.with_budget(budget * part))
         rare: Mapping[str, Any] = {}
         tolerances: Mapping[str, Any] = {}
         if split:

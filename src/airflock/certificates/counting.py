@@ -2,14 +2,14 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
 
 from airflock.certificates.campaign import COUNT_PURPOSE, Campaign, certificate_seed
 from airflock.certificates.limits import EventLimit, InterimLook, alpha_share, flights_needed, look_schedule, take_look
-from airflock.runs import CandidateBatch, Executor, Flight, FlightResult, FlightStore
+from airflock.runs import CandidateBatch, Executor, Flight, FlightResult, FlightStore, OnProgress, RunProgress
 from airflock.support import StudyError
 
 
@@ -18,14 +18,14 @@ class CampaignFlyer:
     """A campaign with its store of flights, who flies them and until when.
 
     until : moment of `time.monotonic` at which the budget of time is spent, s
-    note  : called with a few words as each part begins
+    watch : called with the progress of each part
     """
 
     campaign: Campaign
     store: FlightStore
     executor: Executor
     until: float = math.inf
-    note: Callable[[str], None] | None = None
+    watch: OnProgress | None = None
 
     def with_budget(self, budget: float) -> "CampaignFlyer":
         """Return a copy with a new time budget (s) from now on."""
@@ -45,10 +45,10 @@ class CampaignFlyer:
         """Yield each flight as soon as it is over and stored."""
         return self.store.fly(self.executor, batch, tasks)
 
-    def report(self, text: str) -> None:
-        """Call `note`, if there is one, as a part begins."""
-        if self.note:
-            self.note(text)
+    def report(self, stage: str, *progress: Any) -> None:
+        """Pass the progress to `watch`, if there is one; the arguments are those of a RunProgress."""
+        if self.watch:
+            self.watch(RunProgress(stage, *progress))
 
 
 COUNT_BATCH = CandidateBatch("count", 0, 0)
@@ -117,25 +117,12 @@ class CountResult:
     rate: float = 0.0
 
 
-@dataclass(frozen=True)
-class CountProgress:
-    """How far counting is: flights (those of the store included), flights that decide, events of each limit so far."""
-
-    done: int
-    total: int
-    events: tuple[int, ...]
-    rate: float
-
-
-OnCountProgress = Callable[[CountProgress], None]
-
-
-def count_events(flyer: CampaignFlyer, on_progress: OnCountProgress | None = None) -> CountResult:
+def count_events(flyer: CampaignFlyer) -> CountResult:
     """Count events over the seeds of a campaign, in their order, until its time is over.
 
     Raises StudyError for a flight that fails: a certificate leaves none out.
     """
-    counting = _Counting(flyer, on_progress)
+    counting = _Counting(flyer)
     while counting.goes_on():
         counting.fly()
     counting.result.seconds = time.monotonic() - counting.began
@@ -148,8 +135,8 @@ class _Counting:
     scores : of flights by number, in whatever order they landed; only a prefix without holes counts
     """
 
-    def __init__(self, flyer: CampaignFlyer, watch: OnCountProgress | None):
-        self.flyer, self.watch = flyer, watch
+    def __init__(self, flyer: CampaignFlyer):
+        self.flyer = flyer
         self.campaign = campaign = flyer.campaign
         self.began, self.fresh, self.chunk = time.monotonic(), 0, FIRST
         self.scores: dict[int, Mapping[str, Any]] = {}
@@ -215,9 +202,10 @@ class _Counting:
             self._note()
 
     def _note(self) -> None:
-        if self.watch:
-            total = max([*self.aims, len(self.scores)])
-            self.watch(CountProgress(len(self.scores), total, tuple(self.events), self.result.rate))
+        events = ", ".join(str(count) for count in self.events)
+        text = f"{events} events, {self.result.rate:.1f} flights/s"
+        total = max([*self.aims, len(self.scores)])
+        self.flyer.report("counting", text, len(self.scores), total, self.fresh)
 
 
 def _open(campaign: Campaign, verdict: LimitVerdict) -> bool:

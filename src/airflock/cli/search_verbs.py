@@ -1,8 +1,6 @@
 """Verbs evolve, harden, tune and certify: search for parameters, make them safer, and bound their risks."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, terminal
-from airflock.cli.terminal import counting_parts, progress_line, search_progress
+from airflock.cli.terminal import counting_parts, progress_line, run_progress
 from airflock.support import INVALID, PICTURES, SCENARIOS, ScenarioError, invalid_if, value_or_default
 
 
@@ -135,8 +133,8 @@ def evolve(
     terminal.print_notes([note for note in notes if note])
     begin = time.perf_counter()
     executor = study_executor(study, scheduler, threads, timeout)
-    with search_progress(study, quiet or as_json) as (watch, note):
-        result = run_study(study, out, executor, watch, note, sensitivity=sensitivity)
+    with run_progress(quiet or as_json) as watch:
+        result = run_study(study, out, executor, watch, sensitivity=sensitivity)
     if as_json:
         terminal.print_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
     elif not quiet:
@@ -369,7 +367,7 @@ def tune(
     with progress_line(as_json) as line:
 
         def watch(p: Any) -> None:
-            line.update(p.stage + (f", {p.told}" if p.told else ""), p.done, p.total)
+            line.update(terminal.progress_text(p), p.done, p.total)
 
         def note(text: str) -> None:
             shown.append(text)
@@ -688,8 +686,8 @@ def certify(
     if scheduler is None and scenario is not None:
         options.compile_before_bar(campaign.flown, precision, device)
     also |= {"scheduler": scheduler, "threads": threads, "timeout": timeout}
-    with counting_progress(as_json) as (watch, note):
-        result = fly_campaign(campaign, folder, seconds, watch, note, resume=resume, **also)
+    with run_progress(as_json) as watch:
+        result = fly_campaign(campaign, folder, seconds, watch, resume=resume, **also)
     _end(result, out, plot, as_json)
 
 
@@ -709,18 +707,6 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
         print_certificate(result)
     if not result.shown:
         raise typer.Exit(1)
-
-
-@contextmanager
-def counting_progress(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str], None]]]:
-    """Show flights up to the next look, events so far, flights per second; then the later stages."""
-    with progress_line(quiet) as line:
-
-        def watch(p: Any) -> None:
-            events = ", ".join(str(count) for count in p.events)
-            line.update(f"counting, {events} events, {p.rate:.1f} flights/s", p.done, p.total)
-
-        yield watch, line.update
 
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:

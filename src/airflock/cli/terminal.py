@@ -1,6 +1,5 @@
 """Output of the commands: tables for a terminal, JSON for machines, and progress."""
 
-import itertools
 import json
 import math
 import sys
@@ -266,24 +265,12 @@ def counting_parts(label: str, total: int | None = None, quiet: bool = False) ->
 
 
 @contextmanager
-def search_progress(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[bool], None]]]:
-    """Show the progress of a search: generation, best, mean, flights per second; then of the finalists."""
-    from airflock.search import RACE_ROUNDS
-
-    finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
-    finals += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
-    began, flown = time.perf_counter(), itertools.count(1)
+def run_progress(quiet: bool) -> Iterator[Callable[[Any], None]]:
+    """Show the progress of a run; yields what takes its `airflock.runs.RunProgress`."""
     with progress_line(quiet) as line:
+        yield lambda p: line.update(progress_text(p), p.done, p.total)
 
-        def watch(p: Any) -> None:
-            rate = p.fresh / max(time.perf_counter() - began, 1e-9)
-            found = "" if p.best is None else f", best {p.best:.4f}"
-            found += "" if p.mean is None else f", mean {p.mean:.4f}"
-            where = f"run {p.run + 1}, " if study.whole("restarts") else ""
-            text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{found}, {rate:.1f} flights/s"
-            line.update(text, p.done, p.total)
 
-        def note(_: bool) -> None:
-            line.update("finalists on fresh seeds", min(next(flown), finals), finals)
-
-        yield watch, note
+def progress_text(p: Any) -> str:
+    """Return stage and words of a progress."""
+    return ", ".join(filter(None, (p.stage, p.text)))

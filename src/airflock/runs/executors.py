@@ -54,6 +54,43 @@ class FlightResult:
     worker: str = ""
 
 
+@dataclass(frozen=True)
+class RunProgress:
+    """Progress of a run.
+
+    stage, text : what is under way, and a few words on it
+    done, total : flights of the stage, those of the store included; total is None where it is not known
+    fresh       : flights of the stage that this process has flown
+    """
+
+    stage: str
+    text: str = ""
+    done: int = 0
+    total: int | None = None
+    fresh: int = 0
+
+
+OnProgress = Callable[[RunProgress], None]
+
+
+@dataclass
+class ProgressTally:
+    """Flights of a stage so far, passed to `watch` after each."""
+
+    stage: str
+    total: int
+    watch: OnProgress | None
+    text: str = ""
+    done: int = 0
+    fresh: int = 0
+
+    def note(self, is_new: bool) -> None:
+        """Count one more flight, flown now or read from the store."""
+        self.done, self.fresh = self.done + 1, self.fresh + is_new
+        if self.watch:
+            self.watch(RunProgress(self.stage, self.text, self.done, max(self.total, self.done), self.fresh))
+
+
 class Executor(Protocol):
     """Flies flights in any order."""
 

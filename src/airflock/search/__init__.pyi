@@ -9,8 +9,6 @@ from .evolution import (
     study_executor as study_executor,
     validate as validate,
 )
-from .finals import RACE_ROUNDS as RACE_ROUNDS
-from .generations import SearchProgress as SearchProgress
 from .hardening import (
     MAX_ROUNDS as MAX_ROUNDS,
     harden as harden,

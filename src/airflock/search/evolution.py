@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +19,8 @@ from airflock.runs import (
     CandidateBatch,
     Executor,
     FlightStore,
+    OnProgress,
+    ProgressTally,
     ScenarioTask,
     check_timeout,
     check_worker_device,
@@ -31,7 +33,7 @@ from airflock.runs import (
 )
 from airflock.scenarios import Scenario, load, scenario_variant
 from airflock.search.finals import conclude_study
-from airflock.search.generations import Evaluator, OnSearchProgress, run_search
+from airflock.search.generations import Evaluator, run_search
 from airflock.search.objectives import Objective, UserFitness
 from airflock.search.search_settings import fast_search_keys as fast_keys
 from airflock.search.study import Study, is_study, load_study, make_study, study_of_request, study_summary
@@ -55,7 +57,7 @@ def evolve(
     device: str = "cpu",
     timeout: float | None = None,
     sensitivity: str = "",
-    watch: OnSearchProgress | None = None,
+    watch: OnProgress | None = None,
     trust: bool = False,
     fast: bool = False,
     **search_keys: Any,
@@ -97,7 +99,7 @@ def evolve(
     sensitivity : str
         "sobol" or "morris": also measure which parameters matter; table sensitivity.csv.
     watch : callable, optional
-        Called with a Progress after each flight.
+        Called with an `airflock.runs.RunProgress` after each flight.
     trust : bool
         Whether code that files name may run: a law, fitness functions.
     fast : bool
@@ -185,8 +187,7 @@ def run_study(
     study: Study,
     folder: Path,
     executor: Executor,
-    on_progress: OnSearchProgress | None = None,
-    notify: Callable[[bool], None] | None = None,
+    on_progress: OnProgress | None = None,
     *,
     sensitivity: str = "",
 ) -> EvolveResult:
@@ -199,9 +200,9 @@ def run_study(
     sensitivity = sensitivity or (read_request(folder, study.kind) or {}).get("also", {}).get("sensitivity", "")
     with open_run(folder, executor) as store:
         centres = run_search(study, store, executor, on_progress)
-        result = conclude_study(study, store, executor, centres, folder, notify)
+        result = conclude_study(study, store, executor, centres, folder, on_progress)
         if sensitivity:
-            shares = run_sensitivity(study, store, executor, method=sensitivity, on_flight=notify)
+            shares = run_sensitivity(study, store, executor, method=sensitivity, on_progress=on_progress)
             atomic.write_file(folder / "sensitivity.csv", shares.to_csv(index=False))
         if store.landed or not (folder / RESULT_FILE).is_file():
             export(store, folder, study.labels)
@@ -395,7 +396,7 @@ def run_sensitivity(
     *,
     method: str = "morris",
     samples: int = 16,
-    on_flight: Callable[[bool], None] | None = None,
+    on_progress: OnProgress | None = None,
 ) -> pd.DataFrame:
     """Measure the effect of each parameter on the first objective over the study's whole space.
 
@@ -423,7 +424,8 @@ def run_sensitivity(
     # Common random numbers: otherwise the chance of single flights would pass for an effect of a
     # parameter.
     seeds = [[study.seed(3, j) for j in range(k)]] * len(points)
-    rows = Evaluator(study, store, executor, on_flight).evaluate(batch, np.asarray(points), seeds=seeds)
+    tally = ProgressTally("sensitivity", len(points) * k * len(study.scenarios), on_progress, method)
+    rows = Evaluator(study, store, executor, tally.note).evaluate(batch, np.asarray(points), seeds=seeds)
     values = np.array([np.nan if row[0] is None else row[0] for row in rows])
     if not np.isfinite(values).any():
         raise StudyError("every candidate failed: no sensitivity")

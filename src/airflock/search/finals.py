@@ -6,7 +6,7 @@ winner once more on other fresh seeds for an unbiased score; working ranges are 
 where candidates of the search reached at least the winner's mean.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,15 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from airflock.runs import CandidateBatch, Executor, FlightStore, with_parameters, write_toml_file
+from airflock.runs import (
+    CandidateBatch,
+    Executor,
+    FlightStore,
+    OnProgress,
+    ProgressTally,
+    with_parameters,
+    write_toml_file,
+)
 from airflock.search.generations import Evaluator, dead_reason
 from airflock.search.limit_excess import batch_excess, limit_reports, rank_by_excess
 from airflock.search.objectives import candidate_losses as losses_of
@@ -42,19 +50,22 @@ def conclude_study(
     executor: Executor,
     centres: Sequence[NDArray[np.float64]],
     folder: Path,
-    on_flight: Callable[[bool], None] | None = None,
+    on_progress: OnProgress | None = None,
 ) -> EvolveResult:
     """Evaluate finalists, choose the winner, and write best.toml into the study's folder.
 
     centres : final mean of each run, points of the unit cube
-    on_flight : called after each flight with True if it is new
+    on_progress : called after each flight
 
     Raises StudyError where every candidate of the search failed.
     """
     first = study.objectives[0]
     table = candidate_table(store, [objective.name for objective in study.objectives])
     sound = _sound_candidates(study, store, table, folder)
-    evaluator = Evaluator(study, store, executor, on_flight)
+    flights = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
+    flights += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
+    tally = ProgressTally("finals", flights * len(study.scenarios), on_progress, "finalists on fresh seeds")
+    evaluator = Evaluator(study, store, executor, tally.note)
     points, origins = select_finalists(evaluator, sound, centres)
     rows, i = fly_finalists(evaluator, points)
     winner = study.space.parameters(points[i])

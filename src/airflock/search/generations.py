@@ -14,7 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.runs import CandidateBatch, Executor, Flight, FlightStore, declared_numbers, parse_values
+from airflock.runs import (
+    CandidateBatch,
+    Executor,
+    Flight,
+    FlightStore,
+    OnProgress,
+    ProgressTally,
+    declared_numbers,
+    parse_values,
+)
 from airflock.scenarios import Scenario
 from airflock.search.limit_excess import batch_excess, rank_by_excess
 from airflock.search.objectives import Objective, candidate_losses
@@ -243,58 +252,6 @@ def _number(value: Any) -> bool:
 SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding on another machine, not by more
 
 
-@dataclass(frozen=True)
-class SearchProgress:
-    """Progress of a search, after each flight and each generation.
-
-    done, total : flights, those of the store included; fresh : flights of this process
-    best, mean  : first objective of the best candidate so far and of the last generation, of those that keep all
-                  limits; None before there are any
-    """
-
-    run: int
-    generation: int
-    done: int
-    total: int
-    fresh: int
-    best: float | None
-    mean: float | None
-
-
-OnSearchProgress = Callable[[SearchProgress], None]
-
-
-@dataclass
-class ProgressTally:
-    """Counts of a search so far, passed to `watch`."""
-
-    total: int
-    watch: OnSearchProgress | None
-    run: int = 0
-    generation: int = 0
-    done: int = 0
-    fresh: int = 0
-    best: float | None = None
-    mean: float | None = None
-
-    def note(self, is_new: bool) -> None:
-        """Count one more flight, flown now or read from the store."""
-        self.done, self.fresh = self.done + 1, self.fresh + is_new
-        if self.watch:
-            self.watch(
-                SearchProgress(self.run, self.generation, self.done, self.total, self.fresh, self.best, self.mean)
-            )
-
-    def end_generation(self, values: Sequence[float | None], maximise: bool) -> None:
-        """Update the best and the mean value from the first objective of a generation's candidates."""
-        found = [value for value in values if value is not None]
-        if not found:
-            return
-        self.mean = sum(found) / len(found)
-        known = [*found, *([] if self.best is None else [self.best])]
-        self.best = max(known) if maximise else min(known)
-
-
 def total_flights(study: Study) -> int:
     """Return the number of flights of the whole search."""
     candidates = (study.whole("restarts") + 1) * study.whole("population")
@@ -303,26 +260,29 @@ def total_flights(study: Study) -> int:
 
 
 def run_search(
-    study: Study, store: FlightStore, executor: Executor, on_progress: OnSearchProgress | None = None
+    study: Study, store: FlightStore, executor: Executor, on_progress: OnProgress | None = None
 ) -> list[NDArray[np.float64]]:
     """Run the search of a study to its end, or to Ctrl-C.
 
     Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if
     requested.
     """
-    tally = ProgressTally(total_flights(study), on_progress)
+    tally, sound = ProgressTally("search", total_flights(study), on_progress), []
     evaluator = Evaluator(study, store, executor, tally.note)
     centres: list[NDArray[np.float64]] = []
     for run in range(study.whole("restarts") + 1):
-        means = _run(evaluator, run, tally)
+        means = _run(evaluator, run, tally, sound)
         if means:
             found = averaged_means(means, study.whole("averages")) + windowed_means(means, study.whole("windows"))
             centres += [means[-1], *found]
     return centres
 
 
-def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[np.float64]]:
-    """Run the optimiser once; return its mean (axis,) after each generation of whole flights, if it has one."""
+def _run(evaluator: Evaluator, run: int, tally: ProgressTally, sound: list[list[float]]) -> list[NDArray[np.float64]]:
+    """Run the optimiser once; return its mean (axis,) after each generation of whole flights, if it has one.
+
+    sound : first objective of the candidates that keep all limits, of each generation so far; grows
+    """
     # Optimiser state is not stored: replay with the stored flights takes 4 ms a generation and
     # notices another version of pycma, which a pickle would follow astray.
     study, store = evaluator.study, evaluator.store
@@ -336,24 +296,26 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
     seen: list[float | None] = []
     whole = 0
     for generation in range(study.whole("generations")):
-        tally.run, tally.generation = run, generation
+        where = f"run {run + 1}, " if study.search.restarts else ""
+        tally.text = f"{where}generation {generation + 1}/{study.whole('generations')}"
+        if sound:
+            best = (max if first.maximise else min)(max(row) if first.maximise else min(row) for row in sound)
+            tally.text += f", best {best:.4f}, mean {sum(sound[-1]) / len(sound[-1]):.4f}"
         batch = CandidateBatch("search", run, generation)
         points = _asked(store, batch, state.ask())
         rows = evaluator.evaluate(batch, points, duration_share=length.share)
         values, losses = [row[0] for row in rows], candidate_losses(rows, study.objectives)
-        sound = values
+        excess = np.zeros(len(values))
         if study.limits:
-            broken = batch_excess(study, store, batch, length.share)
-            losses, sound = (
-                rank_by_excess(losses, broken),
-                [v for v, much in zip(values, broken, strict=True) if much == 0.0],
-            )
+            excess = batch_excess(study, store, batch, length.share)
+            losses = rank_by_excess(losses, excess)
         state.tell(points, losses)
         centre = state.centre()
         # Means of generations with short flights are no finalists: their fitness is on another
         # scale.
         if length.whole:
-            tally.end_generation(sound, first.maximise)
+            kept = [v for v, much in zip(values, excess, strict=True) if v is not None and much == 0.0]
+            sound += [kept] if kept else []
             seen += values
             if run == 0:
                 refuse_flat(study, store, whole, seen)

@@ -1,11 +1,11 @@
 """What a tuning is: its plan for a budget of time, its request, its progress and its result."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from airflock import __version__
 from airflock.certificates import Certificate, scenario_identity
@@ -183,22 +183,6 @@ def scenario_text_document(scenario: Scenario) -> dict[str, Any]:
 
 
 PILOT = 4  # flights per core by which the time of one flight is measured
-Notify = Callable[[str], None]
-
-
-class TuneProgress(NamedTuple):
-    """Progress of a tuning: its stage, a short message, flights so far and in total.
-
-    total : None where it is not known; hardening often ends before its total
-    """
-
-    stage: str
-    told: str = ""
-    done: int = 0
-    total: int | None = None
-
-
-OnTuneProgress = Callable[[TuneProgress], None]
 
 
 def measure_flight_rate(scenario: Scenario, threads: int | None) -> float:

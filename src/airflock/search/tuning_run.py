@@ -4,13 +4,12 @@ Each stage is kept in the folder and continued where it was interrupted.
 """
 
 import hashlib
-import itertools
 import json
 import math
 import os
 import time
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,6 @@ from airflock.certificates import (
     COUNT_BUDGET_SHARE,
     Campaign,
     Certificate,
-    CountProgress,
     campaign_from_request,
     flights_to_show,
     fly_campaign,
@@ -28,10 +26,18 @@ from airflock.certificates import (
 )
 from airflock.estimate import IdentifyResult, identify, read_heard
 from airflock.parts.metrics import scalar_names
-from airflock.runs import RESULT_FILE, Interrupted, held_request, open_folder, write_toml_file
+from airflock.runs import (
+    RESULT_FILE,
+    Interrupted,
+    OnProgress,
+    ProgressTally,
+    RunProgress,
+    held_request,
+    open_folder,
+    write_toml_file,
+)
 from airflock.scenarios import Scenario, build_scenario, load, rebuilt, scenario_variant, starting_set
 from airflock.search.evolution import run_study, study_executor
-from airflock.search.generations import SearchProgress
 from airflock.search.hardening import MAX_ROUNDS, StepResult, harden, hardened_document
 from airflock.search.limit_excess import flights_per_event
 from airflock.search.study import make_study
@@ -47,9 +53,6 @@ from airflock.search.tune_stages import (
     STUDY_FOLDER,
     TUNED_FILE,
     BudgetPlan,
-    Notify,
-    OnTuneProgress,
-    TuneProgress,
     TuneResult,
     Tuning,
     load_plan,
@@ -283,8 +286,8 @@ def tune(
     resume: bool = False,
     settings: Mapping[str, Any] | None = None,
     threads: int | None = None,
-    watch: OnTuneProgress | None = None,
-    note: Notify | None = None,
+    watch: OnProgress | None = None,
+    note: Callable[[str], None] | None = None,
     trust: bool = False,
 ) -> TuneResult:
     """From a scenario or logs of your own to a set that is evolved, hardened and certified, with a report.
@@ -317,7 +320,7 @@ def tune(
     threads : int, optional
         Flights side by side; by default one per core.
     watch, note : callable, optional
-        Called as each stage begins and after its flights (`airflock.search.tune_stages.TuneProgress`); called with a
+        Called as each stage begins and after its flights (`airflock.runs.RunProgress`); called with a
         line for each limit that the budget leaves too little time to show.
     trust : bool
         Whether code that files name may run.
@@ -381,7 +384,7 @@ def tune(
             {} if logs is None else logs.report,
         )  # fmt: skip
         if not (folder / RESULT_FILE).is_file():
-            watch(TuneProgress("report"))
+            watch(RunProgress("report"))
             from airflock.search.tune_report import save
 
             save(found)
@@ -393,36 +396,31 @@ def tune(
 
 def search_set(
     folder: Path, start: Scenario, search: Mapping[str, Any], limits: Sequence[str], threads: int | None,
-    watch: OnTuneProgress,
+    watch: OnProgress,
 ) -> EvolveResult:  # fmt: skip
     """Begin or continue the search in its folder; return its result."""
-    watch(TuneProgress("search"))
-
-    def searched(p: SearchProgress) -> None:
-        best = "" if p.best is None else f", best {p.best:.4f}"
-        watch(TuneProgress("search", f"generation {p.generation + 1}{best}", p.done, p.total))
-
     objective = {"objective": {"limits": list(limits)}} if limits else {}
     study = make_study(objective, start.name, search=search, scenario=start)
     open_folder(folder, study)
-    return run_study(study, folder, study_executor(study, threads=threads), searched)
+    return run_study(study, folder, study_executor(study, threads=threads), watch)
 
 
 def harden_set(
-    folder: Path, seeds: int, limits: Sequence[str], threads: int | None, trust: bool, watch: OnTuneProgress
+    folder: Path, seeds: int, limits: Sequence[str], threads: int | None, trust: bool, watch: OnProgress
 ) -> tuple[Scenario, list[StepResult], str]:
     """Harden the set that the search found; return it as tuned.toml holds it, its steps, and why there are none."""
     best = load(folder / STUDY_FOLDER / BEST_FILE, trust=trust)
-    flown = itertools.count(1)
-    watch(TuneProgress("hardening"))
-
-    def done() -> None:
-        count = next(flown)
-        watch(TuneProgress("hardening", "", count, max(count, MAX_ROUNDS * seeds)))
-
+    tally = ProgressTally("hardening", MAX_ROUNDS * seeds, watch)
     steps, why = [], ""
     try:
-        steps = harden(best, range(seeds), limit=limits, threads=threads, done=done, folder=folder / HARDENING_FOLDER)
+        steps = harden(
+            best,
+            range(seeds),
+            limit=limits,
+            threads=threads,
+            done=lambda: tally.note(True),
+            folder=folder / HARDENING_FOLDER,
+        )
         document, comment = hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune."
     except ScenarioError as error:
         why = error.errors[0]
@@ -435,22 +433,13 @@ def harden_set(
 
 
 def certify_set(
-    folder: Path, tuned: Scenario, limits: Sequence[str], plan: BudgetPlan, threads: int | None, watch: OnTuneProgress
+    folder: Path, tuned: Scenario, limits: Sequence[str], plan: BudgetPlan, threads: int | None, watch: OnProgress
 ) -> Certificate:
     """Certify the tuned set; save the certificate in the folder and return it."""
-    watch(TuneProgress("certificate"))
-
-    def counted(p: CountProgress) -> None:
-        events = ", ".join(str(count) for count in p.events)
-        watch(TuneProgress("certificate", f"{events} events", p.done, p.total))
-
-    def follows(text: str) -> None:
-        watch(TuneProgress("certificate", text))
-
     place = folder / CERTIFICATE_FOLDER
     made = fly_campaign(
         campaign_from_request(tuned, limits, plan.confidence), place,
-        None if (place / RESULT_FILE).is_file() else plan.seconds, counted, follows,
+        None if (place / RESULT_FILE).is_file() else plan.seconds, watch,
         keys=used_and_unused_keys(tuned), threads=threads,
     )  # fmt: skip
     made.save(folder / CERTIFICATE_FILE)
