@@ -108,6 +108,18 @@ def of_tuning(folder):
     return rows(folder / "study"), rows(folder / "hardening_flights"), texts, told["limit"], told["flights"]
 
 
+def grid(folder):
+    """A sweep of real flights, tiny ones."""
+    import airflock
+
+    what = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 40.0})
+    airflock.sweep(what, {"radio.delay": [0.0, 0.5]}, 60, out=folder, resume=(folder / REQUEST_FILE).is_file())
+
+
+def of_grid(folder):
+    return rows(folder), (folder / "result.csv").read_text()
+
+
 def tracks(folder):
     """A table of tracks becomes a recording and a table again."""
     import numpy as np
@@ -154,6 +166,7 @@ LIVES = {
     "evolve": (evolve, of_study),
     "certify": (certify, of_certificate),
     "tune": (tune, of_tuning),
+    "grid": (grid, of_grid),
     "import": (tracks, of_tracks),
     "studio": (studio, of_tracks),
 }

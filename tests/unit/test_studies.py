@@ -296,10 +296,11 @@ def test_command_tells_bad_input_in_lines_with_status_2(tmp_path):
     assert not (tmp_path / "a" / FILE).exists()
 
 
-def test_kills_at_random_moments_change_nothing(tmp_path, seed, request):
-    kills = 200 if request.config.getoption("--papers") else 8
+@pytest.mark.parametrize(("what", "few"), [("evolve", 8), ("certify", 8), ("tune", 2), ("grid", 4)])
+def test_kills_at_random_moments_change_nothing(tmp_path, seed, request, what, few):
+    kills = 200 if request.config.getoption("--papers") else few
     script = Path(__file__).parents[1] / "kills.py"
-    command = [sys.executable, script, tmp_path, "--kills", str(kills), "--seed", str(seed)]
+    command = [sys.executable, script, tmp_path, "--what", what, "--kills", str(kills), "--seed", str(seed)]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=1800)
     assert ended.returncode == 0, ended.stderr
     assert "all ends identical" in ended.stdout

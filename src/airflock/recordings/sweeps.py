@@ -226,6 +226,7 @@ def fly_sweep(
     # One list of all flights: workers are busy until the end of the sweep, not of each point.
     jobs = [(place, seed) for place in range(len(made.points)) for seed in made.seeds]
     flights = [made.scenarios[place] for place, _ in jobs]
+    rows: Sequence[Mapping[str, Any]]
     if out is None:
         rows = score_scenarios(flights, [seed for _, seed in jobs], precision=made.precision, **options)
     else:

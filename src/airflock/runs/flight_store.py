@@ -160,8 +160,9 @@ class FlightStore:
         """
         flown = self.flown(batch)
         missing = [each for each in flights if (each.candidate_index, each.repeat) not in flown]
-        for _ in range(len(flights) - len(missing) if on_done else 0):
-            on_done()
+        if on_done:
+            for _ in range(len(flights) - len(missing)):
+                on_done()
         for landed in self.fly(executor, batch, missing):
             if landed.values is None:
                 break

@@ -236,11 +236,12 @@ def evolve_request(
         beside = {key: value for key, value in others.items() if key not in ("fitness", "trust")}
         held, given = held_request(folder, Study.kind, beside), None
     else:
-        held = None if folder is None else read_request(folder, Study.kind)
+        found = None if folder is None else read_request(folder, Study.kind)
         given = study_from_request(scenario, settings, search_keys=keys, limit=limits, fitness=fitness, **others)
-        if held is None or isinstance(scenario, Study) or held.get("airflock") != __version__:
+        if found is None or isinstance(scenario, Study) or found.get("airflock") != __version__:
             return given, ""
-    objectives = None if fitness is None else (own_objective(fitness),)
+        held = found
+    objectives: tuple[Objective, ...] | None = None if fitness is None else (own_objective(fitness),)
     if given is not None and (others.get("objective") or any(objective.own for objective in given.objectives)):
         objectives = given.objectives
     changes: dict[str, Any] = {"settings": settings, "search": keys, "limits": limits, "objectives": objectives}

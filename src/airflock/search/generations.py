@@ -267,7 +267,8 @@ def run_search(
     Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if
     requested.
     """
-    tally, sound = ProgressTally("search", total_flights(study), on_progress), []
+    tally = ProgressTally("search", total_flights(study), on_progress)
+    sound: list[list[float]] = []
     evaluator = Evaluator(study, store, executor, tally.note)
     centres: list[NDArray[np.float64]] = []
     for run in range(study.whole("restarts") + 1):
