@@ -282,7 +282,7 @@ def _memory(path):
 
 def _plan(path):
     from airflock.runs.folder import read_toml_file
-    from airflock.search.tune_stages import read_plan
+    from airflock.search.tuning_run import read_plan
 
     read_plan(read_toml_file(path), path)
 

@@ -21,17 +21,20 @@ from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import tuning_run as tuning
 from airflock.search.finals import RACE_ROUNDS
 from airflock.search.tune_report import default_rows, replay_files
-from airflock.search.tune_stages import (
+from airflock.search.tuning_run import (
     CERTIFY_SHARE,
     HARDEN,
     MOST_SEEDS,
     POPULATION,
     SEARCH,
     TRIED,
+    default_limits,
+    infeasible_limit_lines,
     make_plan,
+    prepare_start,
     read_plan,
+    tune,
 )
-from airflock.search.tuning_run import default_limits, infeasible_limit_lines, prepare_start, tune
 from airflock.support.errors import RecordingError, ScenarioError, StudyError
 
 SEEDS = "SELECT seed FROM flight WHERE stage=?"

@@ -28,5 +28,9 @@ from .study_result import (
     further_best_files as further_best_files,
 )
 from .study_space import shipped_study_axes as shipped_study_axes
-from .tune_stages import load_plan as load_plan
-from .tuning_run import make_request as make_request, prepare_start as prepare_start, tune as tune
+from .tuning_run import (
+    load_plan as load_plan,
+    make_request as make_request,
+    prepare_start as prepare_start,
+    tune as tune,
+)

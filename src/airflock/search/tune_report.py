@@ -23,7 +23,7 @@ from airflock.runs import FlightStore, declared_numbers, with_parameters
 from airflock.scenarios import Scenario, step_counts, summary
 from airflock.search.limit_excess import limit_report_line
 from airflock.search.study_result import candidate_table
-from airflock.search.tune_stages import (
+from airflock.search.tuning_run import (
     CERTIFICATE_FILE,
     CERTIFICATE_FOLDER,
     HARDENING_FOLDER,
