@@ -7,6 +7,7 @@ import tomllib
 
 import pytest
 import tomlkit
+from _pytest.outcomes import Failed
 from typer.testing import CliRunner
 
 from airflock.certificates.campaign import (
@@ -120,6 +121,23 @@ def test_a_folder_of_another_campaign_is_refused(tmp_path):
         flown(campaign(), tmp_path / "a", 0.0)
     with pytest.raises(StudyError, match="holds another campaign: confidence = 0.95 there, 0.9 now"):
         flown(campaign(confidence=0.9), tmp_path / "a", 0.0, resume=True)
+
+
+def test_a_campaign_goes_on_from_its_folder_alone_and_flies_no_more_once_it_is_over(tmp_path, monkeypatch):
+    short = load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 1.0})
+    how = {"folder": tmp_path / "a", "precision": 64}
+    begun = certify(short, ["r_min<0.01 at 20%", "phi_vel>=0 in 60%"], tolerance=["agents"], budget=20.0, **how)
+    monkeypatch.setattr(ThreadExecutor, "fly", lambda _, flights: pytest.fail("flown") if flights else iter(()))
+    again = certify(folder=tmp_path / "a", resume=True)
+    before, now = (each.document() for each in (begun, again))
+    assert {**now, "seal": before["seal"]} == before and now["tolerance"]["axis"]
+    assert (tmp_path / "a" / "result.toml").read_text() != ""
+    with pytest.raises(StudyError, match="^limit: .* holds this itself; leave it out"):
+        certify(limit="r_min<1 at 1%", folder=tmp_path / "a", resume=True)
+    with pytest.raises(StudyError, match="no scenario and no folder to resume"):
+        certify(limit="r_min<1 at 1%")
+    with pytest.raises(Failed):  # what is new takes flights
+        certify(folder=tmp_path / "a", resume=True, tolerance=["radio.delay"])
 
 
 def test_a_flight_that_fails_is_no_flight_that_went_well(tmp_path):

@@ -110,6 +110,24 @@ def test_a_sweep_of_one_point_is_a_score():
     assert swept["phi_vel"].tolist() == scored["phi_vel"].tolist()
 
 
+def test_a_sweep_in_a_folder_is_the_sweep_and_goes_on_from_the_folder_alone(tmp_path, monkeypatch):
+    short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    over = {"radio.kind": ["constant", "links"], "model.p_rep": [0.1, 0.2]}
+    plain = airflock.sweep(short, over, seeds=[3, 5])
+    kept = airflock.sweep(short, over, seeds=[3, 5], out=tmp_path / "a")
+    assert kept.equals(plain) and kept.attrs == plain.attrs
+    with pytest.raises(airflock.AirflockError, match="already holds a sweep; continue it with --resume"):
+        airflock.sweep(short, over, seeds=[3, 5], out=tmp_path / "a")
+    with pytest.raises(airflock.AirflockError, match="holds another sweep: seeds = "):
+        airflock.sweep(short, over, seeds=[3, 6], out=tmp_path / "a", resume=True)
+    with pytest.raises(airflock.AirflockError, match="^over: .* holds this itself"):
+        airflock.sweep(over=over, out=tmp_path / "a", resume=True)
+    with pytest.raises(airflock.AirflockError, match="a folder keeps seeds below 2.63"):
+        airflock.sweep(short, over, seeds=[1 << 63], out=tmp_path / "b")
+    monkeypatch.setattr("airflock.runs.executors.ScenarioTask.score", lambda *_: pytest.fail("flown"))
+    assert airflock.sweep(out=tmp_path / "a", resume=True).equals(plain)
+
+
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_the_help_of_every_command_shows_a_call_of_it(name):
     assert f"Example: airflock {name}" in COMMANDS[name].help

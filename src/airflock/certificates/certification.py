@@ -43,6 +43,7 @@ from airflock.runs import (
     program_versions,
     read_request,
     run_folder,
+    to_toml_values,
     write_toml_file,
 )
 from airflock.scenarios import Scenario, formats, scenario_variant
@@ -421,16 +422,18 @@ def fly_campaign(
 
     budget : s; None: BUDGET for one that is not over yet
     """
-    extras = {"tolerance": list(keys), "split": split, "map": dict(axes or {})}
+    extras: dict[str, Any] = {"tolerance": list(keys), "split": split, "map": dict(axes or {})}
+    extras = {key: to_toml_values(value) for key, value in extras.items() if value}
     with run_folder(folder) as path:
-        is_over = budget is None and resume is not False and (path / RESULT_FILE).is_file()
+        held = read_request(path, campaign.kind, resume=resume) or {}
+        is_over = budget is None and (path / RESULT_FILE).is_file() and extras.items() <= held.get("also", {}).items()
         executor = make_executor([campaign.task], scheduler=scheduler, threads=threads, timeout=timeout)
         try:
             if scheduler is None and campaign.device == "cpu" and not is_over:
                 campaign.task.compile()  # which takes none of the time for flights
             budget = 0.0 if is_over else BUDGET if budget is None else budget
             campaign = with_planned_flights(campaign, executor, budget, path, resume is not False)
-            open_folder(path, campaign, resume=resume, also={key: value for key, value in extras.items() if value})
+            open_folder(path, campaign, resume=resume, also=extras)
             return run_campaign(
                 campaign, path, executor, budget, on_progress, keys=keys, split=split, axes=axes, threads=threads,
                 is_stored=folder is not None,

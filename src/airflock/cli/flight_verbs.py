@@ -340,7 +340,7 @@ def sweep(
     else:
         axes = _axes(over or [], plot, errors)
         numbers = errors.read(options.seeds_from, first_seed, seeds)
-        made = errors.read(make_sweep, scenario, axes, numbers, fixed, law, precision, trust=trust)
+        made = errors.read(make_sweep, scenario, axes, numbers, fixed, law, precision, device, trust=trust)
     name = errors.read(lambda found: metric_to_show(show, found.scenarios), made) if scenario or resume else ""
     errors.read(options.check_flight_options, device, precision, scheduler)
     errors.raise_errors()
@@ -350,7 +350,7 @@ def sweep(
         options.compile_before_bar(made.scenarios[0], made.precision, device)
     with counting_parts(f"{made.scenario.name}: flights", len(made.points) * len(made.seeds), quiet=as_json) as done:
         tidy = fly_sweep(
-            made, out=out, resume=resume, threads=threads, on_done=done, device=device, scheduler=scheduler,
+            made, out=out, resume=resume, threads=threads, on_done=done, scheduler=scheduler,
             notify=terminal.print_message,
         )  # fmt: skip
     _keep(tidy, list(made.over), name, made.scenarios[0], table, plot)

@@ -4,7 +4,7 @@ import hashlib
 import itertools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -115,8 +115,8 @@ def sweep(
         beside = {"over": over, "settings": settings, "law": law}
         made = resumed_sweep(out if resume else None, trust=trust, **beside)
     else:
-        made = make_sweep(scenario, over or {}, check_seeds(seeds), settings, law, precision, trust=trust)
-    options = {"threads": threads, "on_done": done, "device": device, "notify": say}
+        made = make_sweep(scenario, over or {}, check_seeds(seeds), settings, law, precision, device, trust=trust)
+    options = {"threads": threads, "on_done": done, "notify": say}
     return fly_sweep(made, scheduler=scheduler, out=out, resume=resume, **options)
 
 
@@ -126,12 +126,14 @@ class Sweep:
 
     scenario  : what the points change
     scenarios : one for each of `points`
+    device    : cpu, cuda or python; in a folder the choice of auto
     """
 
     scenario: Scenario
     over: Mapping[str, Sequence[Any]]
     seeds: Sequence[int]
     precision: int
+    device: str
     points: Sequence[Mapping[str, Any]]
     scenarios: Sequence[Scenario]
     kind = "sweep"
@@ -144,6 +146,7 @@ class Sweep:
             "airflock": __version__,
             "rules": hashlib.sha256(rules.encode()).hexdigest()[:12],
             "precision": self.precision,
+            "device": self.device,
             "name": self.scenario.name,
             "seeds": list(self.seeds),
             "over": {key: list(values) for key, values in self.over.items()},
@@ -158,6 +161,7 @@ def make_sweep(
     settings: Mapping[str, Any] | None = None,
     law: Any = None,
     precision: int = 32,
+    device: str = "cpu",
     *,
     trust: bool = False,
 ) -> Sweep:
@@ -165,7 +169,7 @@ def make_sweep(
     points = grid_points(over)
     scenarios = scenarios_at(scenario, points, settings, law, trust=trust)
     base = scenario_variant(scenario, settings, law, trust=trust)
-    return Sweep(base, over, seeds, precision, points, scenarios)
+    return Sweep(base, over, seeds, precision, device, points, scenarios)
 
 
 def resumed_sweep(folder: str | os.PathLike[str] | None, *, trust: bool = False, **given: Any) -> Sweep:
@@ -174,7 +178,8 @@ def resumed_sweep(folder: str | os.PathLike[str] | None, *, trust: bool = False,
     with as_error(folder or "", StudyError):
         name, seeds = str(held["name"]), check_seeds(held["seeds"])
         base = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
-        return make_sweep(base, held["over"], seeds, precision=held["precision"], trust=trust)
+        bits, device = held["precision"], held["device"]
+        return make_sweep(base, held["over"], seeds, precision=bits, device=device, trust=trust)
 
 
 def grid_points(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
@@ -228,7 +233,8 @@ def fly_sweep(
     flights = [made.scenarios[place] for place, _ in jobs]
     rows: Sequence[Mapping[str, Any]]
     if out is None:
-        rows = score_scenarios(flights, [seed for _, seed in jobs], precision=made.precision, **options)
+        how = {"precision": made.precision, "device": made.device, **options}
+        rows = score_scenarios(flights, [seed for _, seed in jobs], **how)
     else:
         rows = _fly_in_folder(made, expand_path(out), resume=resume, **options)
     table = pd.DataFrame([{**made.points[i], "seed": seed, **row} for (i, seed), row in zip(jobs, rows, strict=True)])
@@ -239,17 +245,18 @@ def fly_sweep(
 
 
 def _fly_in_folder(
-    made: Sweep, folder: Path, *, resume: bool, device: str, scheduler: str | None, threads: int | None,
+    made: Sweep, folder: Path, *, resume: bool, scheduler: str | None, threads: int | None,
     on_done: Callable[[], None] | None, notify: Callable[[str], None] | None,
 ) -> list[Mapping[str, Any]]:  # fmt: skip
     """Fly what the folder does not hold yet; return the order parameters of all flights as it holds them."""
     if max(made.seeds) >= 1 << 63:
         raise StudyError(f"seed = {max(made.seeds)}: a folder keeps seeds below 2^63; leave out --out, or take another")
-    open_folder(folder, made, resume=resume)
-    check_worker_device(scheduler, device)
+    check_worker_device(scheduler, made.device)
     if scheduler is None:
-        device = pick_device(list(made.scenarios), device, precision=made.precision, notify=notify)
-    tasks = [ScenarioTask(each, made.precision, device) for each in made.scenarios]
+        picked = pick_device(list(made.scenarios), made.device, precision=made.precision, notify=notify)
+        made = replace(made, device=picked)
+    open_folder(folder, made, resume=resume)
+    tasks = [ScenarioTask(each, made.precision, made.device) for each in made.scenarios]
     batch = CandidateBatch("sweep", 0, 0)
     executor = make_executor(tasks, scheduler=scheduler, threads=threads)
     with open_run(folder, executor) as store:

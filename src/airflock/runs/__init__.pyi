@@ -24,6 +24,7 @@ from .folder import (
     REQUEST_FILE as REQUEST_FILE,
     RESULT_FILE as RESULT_FILE,
     Interrupted as Interrupted,
+    differences as differences,
     fingerprint as fingerprint,
     held_request as held_request,
     open_folder as open_folder,

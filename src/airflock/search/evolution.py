@@ -24,11 +24,13 @@ from airflock.runs import (
     ScenarioTask,
     check_timeout,
     check_worker_device,
+    differences,
     held_request,
     make_executor,
     open_folder,
     open_run,
     read_request,
+    to_toml_values,
     write_toml_file,
 )
 from airflock.scenarios import Scenario, load, scenario_variant
@@ -36,7 +38,7 @@ from airflock.search.finals import conclude_study
 from airflock.search.generations import Evaluator, run_search
 from airflock.search.objectives import Objective, UserFitness
 from airflock.search.search_settings import fast_search_keys as fast_keys
-from airflock.search.study import Study, is_study, load_study, make_study, study_of_request, study_summary
+from airflock.search.study import Study, is_study, load_study, make_study, study_of_request
 from airflock.search.study_result import EvolveResult, draw_study, export
 from airflock.support import AirflockError, ErrorCollector, StudyError, as_error, atomic, expand_path
 
@@ -228,7 +230,7 @@ def evolve_request(
 
     scenario : None for what the folder holds
     folder   : of a study to resume; what this call gives wins, so that `open_folder` can compare
-    Returns the study, and a note if it was read from the folder.
+    Returns the study, and a note of what is otherwise in its files and options now.
     """
     limits = [limit] if isinstance(limit, str) else list(limit)
     keys = fast_keys(search_keys or {}, limits=bool(limits)) if fast else dict(search_keys or {})
@@ -248,7 +250,8 @@ def evolve_request(
     with as_error(folder or "", StudyError):
         study = study_of_request(held, given, **changes, trust=bool(others.get("trust")))
     study = replace(study, space=given.space) if given is not None and others.get("space") else study
-    return study, f"goes on with what {folder} holds: {study_summary(study)}"
+    changed = [] if given is None else differences(to_toml_values(study.document()), to_toml_values(given.document()))
+    return study, f"goes on with what {folder} holds: {'; '.join(changed)}" if changed else ""
 
 
 def study_from_request(
