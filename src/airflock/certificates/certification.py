@@ -129,8 +129,10 @@ class ValueScreen:
             for number, each in zip(numbers, own, strict=True)
         ]
 
-    def judged(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> tuple[str, InterimLook | None]:
+    def judged(self, stage: str, parameters: Mapping[str, float]) -> tuple[str, InterimLook | None]:
         """Return safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
+        batch = value_batch(stage, parameters)
+        self.flyer.store.ask(batch, [list(parameters.values())], [parameters])
         # Flights in rounds between looks: a value that is clearly safe or unsafe needs few of them.
         campaign = self.flyer.campaign
         flown = {number: values for (_, number), values in self.flyer.store.flown(batch).items()}
@@ -160,42 +162,30 @@ def value_batch(stage: str, parameters: Mapping[str, float]) -> CandidateBatch:
     return CandidateBatch(f"{stage}: {', '.join(f'{key} = {value!r}' for key, value in parameters.items())}", 0, 0)
 
 
-class ValueTrials:
-    """Values of one number that are tried one after another.
-
-    flights : flown at all of them; verdict : on the last one, as `Screen.judged` says it
-    """
-
-    def __init__(self, screen: ValueScreen, key: str, *, compiles: bool):
-        """`compiles`: the first flight may wait for another driver, which takes none of the time for flights."""
-        self._screen, self._key, self._compiles = screen, key, compiles
-        self.flights, self.verdict = 0, ""
-
-    def safe(self, value: float) -> bool | None:
-        """Return True if a value is safe, None if time ended before that was known."""
-        parameters = {self._key: value}
-        batch = value_batch("tolerance", parameters)
-        self._screen.flyer.store.ask(batch, [[value]], [parameters])
-        if self._compiles and not self.flights:
-            self._screen.begin(batch, parameters)
-        self.verdict, last = self._screen.judged(batch, parameters)
-        self.flights += last.flights if last else 0
-        return None if self.verdict == TIME_OVER else self.verdict == "safe"
-
-
 def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[str, Any]:
     """Move one number until it is no longer safe, then halve the way between."""
     # Doubling brackets the first unsafe value in few trials. Bisection is geometric: tolerances are
     # factors.
     first = nominal or FIRST_VALUE[key]
     last, end = first * REACH ** worse_direction(key), ""
-    trials, safe, bad = ValueTrials(screen, key, compiles=not nominal), nominal, math.nan
+    safe, bad, flights, verdict = nominal, math.nan, 0, ""
+
+    def is_safe(value: float) -> bool | None:
+        """Return None if time ended before that was known."""
+        nonlocal flights, verdict
+        parameters = {key: value}
+        if not nominal and not flights:
+            screen.begin(value_batch("tolerance", parameters), parameters)
+        verdict, look = screen.judged("tolerance", parameters)
+        flights += look.flights if look else 0
+        return None if verdict == TIME_OVER else verdict == "safe"
+
     while worse_direction(key) * (last - safe) > 1e-9 * last:
         candidate = _whole(how, min(max(safe * 2.0 ** worse_direction(key) or first, how.low), how.high))
         if candidate == safe:
             end = f"the end of its range, {how.span}"
             break
-        good = trials.safe(candidate)
+        good = is_safe(candidate)
         if not good:
             bad = candidate if good is not None else math.nan
             break
@@ -204,13 +194,13 @@ def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[
         middle = _whole(how, math.sqrt(safe * bad) if safe else 0.5 * bad)
         if middle in (safe, bad):
             break
-        good = trials.safe(middle)
+        good = is_safe(middle)
         if good is None:
             break
         safe, bad = (middle, bad) if good else (safe, middle)
-    said = "" if trials.verdict in ("safe", "unsafe", "open") else trials.verdict
+    said = "" if verdict in ("safe", "unsafe", "open") else verdict
     note = "; ".join(text for text in (_kind(screen.flyer.campaign, key), end or said) if text)
-    made: dict[str, Any] = {"key": key, "unit": how.unit, "nominal": nominal, "safe": safe, "flights": trials.flights}
+    made: dict[str, Any] = {"key": key, "unit": how.unit, "nominal": nominal, "safe": safe, "flights": flights}
     made |= ({"factor": safe / nominal} if nominal else {}) | ({} if math.isnan(bad) else {"not_shown": bad})
     return made | ({"note": note} if note else {})
 
@@ -261,9 +251,7 @@ def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dic
     for number, values in enumerate(product(*axes.values())):
         flyer.report(f"map: cell {number + 1} of {math.prod(len(v) for v in axes.values())}")
         parameters = dict(zip(axes, values, strict=True))
-        batch = value_batch("map", parameters)
-        flyer.store.ask(batch, [list(values)], [parameters])
-        verdict, found = screen.judged(batch, parameters)
+        verdict, found = screen.judged("map", parameters)
         cell: dict[str, Any] = {"values": list(values), "verdict": verdict, "low": 0.0, "high": 1.0, "flights": 0}
         if found is not None:
             cell |= {"low": found.low, "high": found.high, "flights": found.flights, "events": found.events}

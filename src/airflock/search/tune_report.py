@@ -78,16 +78,34 @@ def report_html(
     result: TuneResult, pictures: Sequence[str], captions: Sequence[str], replay_files: Mapping[int, str]
 ) -> str:
     """The report as one HTML text; pictures are PNGs in base64, `shows` files beside it that play flights by seed."""
+    start, certificate = result.start, result.certificate
+    assumed = [*document_rows(start, result.result.parameters), *default_rows(start)]
+    worst = [
+        (entry["limit"], f"{entry['value']:.4g}", entry["replay"], replay_files.get(int(entry["seed"]), ""))
+        for entry in certificate.worst
+    ]
+    limits, to_run = flight_card_limits(result)
+    no = "" if result.shown else " no"
     body = [
-        *_summary(result),
-        *_assumed(result),
+        f"<h1>{escape(str(start.document.get('title') or start.name))}</h1>",
+        f"<p>{escape(summary(start))}. Airflock {__version__}.</p>",
+        f'<p class="verdict{no}">{"Not all" if no else "All"} limits are shown.</p>',
+        _list(certificate.statements),
+        "<h2>What was assumed</h2>",
+        _table(("key", "value", "source"), assumed),
+        _list([*result.notes, *start.notes]),
         *_identified(result.identify_report),
-        *_flown(result),
+        "<h2>What was flown</h2>",
+        _table(("for", "flights", "seeds"), flight_rows(result)),
+        _list(circumstance_sentences(result)),
         *_searched(result),
         *_hardened(result),
         *_certified(result),
-        *_worst_flights(result, replay_files),
-        *_next_card(result),
+        "<h2>Worst flights</h2>",
+        _table(("limit", "value", "fly it again", ""), worst),
+        "<h2>The flight card to fly next</h2>",
+        _table(("limit on board", "value", "meaning"), limits) if limits else "",
+        f"<p><code>{escape(to_run)}</code></p>" if limits else f"<p>{escape(to_run)}</p>",
         *(
             f'<h2>Figure {i}</h2><img alt="{escape(text)}" src="data:image/png;base64,{picture}"><p>{escape(text)}</p>'
             for i, (picture, text) in enumerate(zip(pictures, captions, strict=True), 1)
@@ -97,38 +115,6 @@ def report_html(
     title = escape(result.scenario.name)
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
     return f"{head}<style>{STYLE}</style><body>{''.join(body)}</body></html>\n"
-
-
-def _summary(found: TuneResult) -> list[str]:
-    """Return the head of the report: the scenario, and if all limits are shown."""
-    shown, start = found.certificate.shown, found.start
-    return [
-        f"<h1>{escape(str(start.document.get('title') or start.name))}</h1>",
-        f"<p>{escape(summary(start))}. Airflock {__version__}.</p>",
-        f'<p class="verdict{"" if shown else " no"}">{"All" if shown else "Not all"} limits are shown.</p>',
-        _list(found.certificate.statements),
-    ]
-
-
-def _assumed(found: TuneResult) -> list[str]:
-    """Return the section of assumptions."""
-    return [
-        "<h2>What was assumed</h2>",
-        _table(
-            ("key", "value", "source"),
-            [*document_rows(found.start, found.result.parameters), *default_rows(found.start)],
-        ),
-        _list([*found.notes, *found.start.notes]),
-    ]
-
-
-def _flown(found: TuneResult) -> list[str]:
-    """How many flights each stage flew on which seeds, and how."""
-    return [
-        "<h2>What was flown</h2>",
-        _table(("for", "flights", "seeds"), flight_rows(found)),
-        _list(circumstance_sentences(found)),
-    ]
 
 
 def _searched(found: TuneResult) -> list[str]:
@@ -209,24 +195,6 @@ def _certified(found: TuneResult) -> list[str]:
         if rows
         else f"<p>{escape(str(made.tolerance.get('reason', 'not asked for')))}</p>",
     ]
-
-
-def _worst_flights(found: TuneResult, shows: Mapping[int, str]) -> list[str]:
-    """The worst flights of each limit, with how to fly and to watch them."""
-    rows = [
-        (entry["limit"], f"{entry['value']:.4g}", entry["replay"], shows.get(int(entry["seed"]), ""))
-        for entry in found.certificate.worst
-    ]
-    return ["<h2>Worst flights</h2>", _table(("limit", "value", "fly it again", ""), rows)]
-
-
-def _next_card(found: TuneResult) -> list[str]:
-    """The flight card of the first real flight."""
-    limits, to_run = flight_card_limits(found)
-    head = "<h2>The flight card to fly next</h2>"
-    if not limits:
-        return [head, f"<p>{escape(to_run)}</p>"]
-    return [head, _table(("limit on board", "value", "meaning"), limits), f"<p><code>{escape(to_run)}</code></p>"]
 
 
 def _range(span: tuple[float, float] | None) -> str:
