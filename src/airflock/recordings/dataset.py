@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.core import COMMANDS
+from airflock.recordings import accessor  # noqa: F401  # every recording passes here, so all of them have it
 from airflock.support import RecordingError
 from airflock.world import arena, half_sizes
 
