@@ -19,7 +19,7 @@ from airflock.estimate.inference import (
     parametric_bootstrap as flights,
     parametric_bootstrap as noise,
 )
-from airflock.estimate.inference.innovation_filter import FilterGains, InnovationFilter
+from airflock.estimate.inference.innovation_filter import FilterGains, InnovationFilter, compiled_loops
 from airflock.estimate.inference.law_inference import InferResult, LawResult, judge_laws
 from airflock.estimate.inference.observed_tracks import (
     ABSENT,
@@ -124,6 +124,28 @@ def test_a_quiet_flock_is_predicted_exactly_by_its_own_law():
     e = InnovationFilter(law, tracks).errors(numbers, FilterGains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
     settled = tracks.state[90:] == COUNTED
     assert settled.any() and np.abs(e[90:].transpose(0, 2, 1)[settled]).max() < 1e-6
+
+
+@pytest.mark.parametrize("law", [None, "vicsek_1995", "couzin_2002"])
+def test_one_compiled_walk_over_all_frames_is_its_text_in_plain_python_and_spans_are_independent(law):
+    tracks = tracks_from_recording(vicsek(missing=0.1, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
+    candidate = None if law is None else candidates.make_candidate(
+        candidates.law_scenarios([law], BOX)[0][0], tracks_scale([tracks]), 2
+    )  # fmt: skip
+    numbers = {} if law is None else {n.column: n.default for n in candidate.numbers}
+    walk, gains = InnovationFilter(candidate, tracks), FilterGains((0.7, 0.4), (0.6, 0.3), 0.8)
+    whole = walk.errors(numbers, gains, SPEED).copy()
+    for number in range(len(tracks.spans)):  # any subset of the spans gives the same, and the text as plain Python does
+        part = slice(*tracks.spans[number])
+        assert np.array_equal(walk.errors(numbers, gains, SPEED, [number])[part], whole[part])
+        own = np.zeros_like(whole[part])
+        none, pace = np.zeros((0, 0, 0)), SPEED if law is None or candidate.commands_heading else 0.0
+        compiled_loops()[1].py_func(
+            *walk.begin(numbers, SPEED), walk.seen[part], tracks.state[part], tracks.speed[part],
+            gains.table(tracks.period), own, none, none, 2, walk.half_sides, pace, SPEED, gains.keep,
+        )  # fmt: skip
+        assert own == pytest.approx(whole[part], abs=1e-12)
+    assert np.abs(whole.transpose(0, 2, 1)[tracks.state != COUNTED]).max() == 0.0 < np.abs(whole).max()
 
 
 def test_errors_of_perception_alone_move_nobody():

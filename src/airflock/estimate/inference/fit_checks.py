@@ -14,7 +14,7 @@ from airflock.estimate.inference.observed_tracks import (
     ENTERS,
     UNSEEN,
 )
-from airflock.estimate.inference.parametric_bootstrap import FitNoise, NoisyFlight
+from airflock.estimate.inference.parametric_bootstrap import FitNoise, fly_span
 
 Array = NDArray[np.float64]
 SHELLS = (0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)  # nearest distances
@@ -259,24 +259,18 @@ def run_predictive_check(
     walk = model.filters[0]
     tracks, axes = walk.tracks, walk.axes
     kept = np.zeros((len(walk.seen), 2 * axes, tracks.individual_count))
-    numbers, gains, usual = model.split(point)
-    walk.errors(numbers, gains, usual, None, kept)
+    walk.errors(*model.split(point), None, kept)
     there = tracks.state > ABSENT
     begin = int(np.argmax(there.sum(axis=1) >= 0.9 * there.sum(axis=1).max()))
     frames = min(len(kept) - begin, round(LONGEST / tracks.period))
     stride = max(1, round(0.5 / tracks.period))
     own = flock_measures(kept[begin : begin + frames : stride], there[begin : begin + frames : stride], tracks.nearest)
     rows = []
-    for number in range(flights):
-        flight = NoisyFlight(walk, (numbers, gains, usual), noise, 1_000_000 + number)
-        flight.begin(1_000_000 + number)
-        walk.fill_past_states(kept[begin])
-        speed: Array | None = np.linalg.norm(kept[begin, axes:], axis=0)
-        flown = np.zeros((-(-frames // stride), 2 * axes, tracks.individual_count))
-        for k in range(frames):
-            if k % stride == 0:
-                flown[k // stride] = walk.now()
-            speed = flight.step(speed)
+    # Who is there at the first frame stays: nobody enters or leaves a flight.
+    state = np.full((frames, tracks.individual_count), COUNTED, np.int8)
+    for number in range(1_000_000, 1_000_000 + flights):
+        generator = np.random.default_rng(number)
+        flown = fly_span(walk, model.split(point), noise, state, kept[begin : begin + 1], number, generator)[::stride]
         rows.append(flock_measures(flown, np.broadcast_to(there[begin], (len(flown), flown.shape[2])), tracks.nearest))
         on_progress()
     found = {}

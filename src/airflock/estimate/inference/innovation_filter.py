@@ -78,66 +78,155 @@ def apply_own_speed(rows, before, i, axes, half, pace, mean_speed, keep):  # typ
         rows[axes + a, i] *= k
 
 
-def correct_state(rows, i, axes, half, seen, gains, h, e, out, counted):  # type: ignore[no-untyped-def]
-    """Compare individual i with its observation, and correct its state by a share; h, e: memory of 3 numbers."""
+def correct_state(rows, k, i, axes, half, seen, gains, gap, e, out, counted):  # type: ignore[no-untyped-def]
+    """Compare individual i with its observation in frame k, and correct its state by a share; e: 3 numbers of memory.
+
+    gap : frames for which it was not seen
+    """
     size, along = 1e-30, 0.0
     # Speed and heading first: errors along and across the heading have different variances and
     # gains.
     for a in range(axes):
         size += rows[axes + a, i] ** 2
-    size = math.sqrt(size)
+    size = 1.0 / math.sqrt(size)
     for a in range(axes):
-        h[a] = rows[axes + a, i] / size
-        e[a] = seen[a, i] - rows[a, i]
+        e[a] = seen[k, a, i] - rows[a, i]
         if half[a] > 0.0:
             e[a] -= 2.0 * half[a] * round(e[a] / (2.0 * half[a]))
-        along += e[a] * h[a]
+        along += e[a] * (rows[axes + a, i] * size)
+    x, y = rows[axes, i] * size, rows[axes + 1, i] * size
     if counted:
-        out[0, i], out[1, i] = along, h[0] * e[1] - h[1] * e[0]
+        out[k, 0, i], out[k, 1, i] = along, x * e[1] - y * e[0]
         if axes == 3:  # to the left, and upwards of heading and left
-            flat = math.sqrt(h[0] * h[0] + h[1] * h[1]) + 1e-30
-            out[1, i] /= flat
-            out[2, i] = flat * e[2] - h[2] * (h[0] * e[0] + h[1] * e[1]) / flat
+            flat = math.sqrt(x * x + y * y) + 1e-30
+            out[k, 1, i] /= flat
+            out[k, 2, i] = flat * e[2] - rows[axes + 2, i] * size * (x * e[0] + y * e[1]) / flat
     for a in range(axes):
-        across = e[a] - along * h[a]
-        rows[a, i] += gains[0, 0] * along * h[a] + gains[1, 0] * across
-        rows[axes + a, i] += gains[0, 1] * along * h[a] + gains[1, 1] * across
+        ahead = along * (rows[axes + a, i] * size)
+        rows[a, i] += gains[0, 0, gap] * ahead + gains[1, 0, gap] * (e[a] - ahead)
+        rows[axes + a, i] += gains[0, 1, gap] * ahead + gains[1, 1, gap] * (e[a] - ahead)
+
+
+def fly_straight(first, last, half, rows, axes, usual, period):  # type: ignore[no-untyped-def]
+    """Move everybody straight on for a period at the usual speed; a driver for those whom no law moves."""
+    for i in range(rows.shape[1] if last > first else 0):
+        size = 1e-30
+        for a in range(axes):
+            size += rows[axes + a, i] ** 2
+        for a in range(axes):
+            rows[axes + a, i] *= usual / math.sqrt(size)
+            rows[a, i] += rows[axes + a, i] * period
 
 
 @cache
-def _kernel() -> Any:
-    """Compile one frame of the filter: compare with the observation and correct the flight."""
+def compiled_loops() -> tuple[Any, Any, Any]:
+    """Compile the driver of straight motion, and the loops over the frames of a span: filtered, and flown freely.
+
+    The driver of the law comes as an argument: a call from Python for each frame took longer than the law itself.
+    """
     from numba import njit
 
-    speed_, right_ = njit(apply_own_speed), njit(correct_state)
+    options = {"error_model": "numpy", "nogil": True}
+    speed_, right_ = njit(**options)(apply_own_speed), njit(**options)(correct_state)
 
-    @njit
-    def kernel(rows, before, unseen, seen, state, speed, gains, out, axes, half, pace, usual, keep):  # type: ignore[no-untyped-def]
-        h, e = np.zeros(3), np.zeros(3)
-        # One individual after another; those who enter take the observed state, and absent ones
-        # wait beyond every range, each at a place of its own, so that no law meets them or divides
-        # by zero.
-        for i in range(state.shape[0]):
-            what = state[i]
-            if what in (ABSENT, ENTERS):
-                for a in range(axes):
-                    rows[a, i] = seen[a, i] if what == ENTERS else AWAY * (2.0 + i)
-                    rows[axes + a, i] = speed[a, i] if what == ENTERS else 1.0
-                unseen[i] = 0
-            else:
-                # Before the correction: the step that is scaled is the predicted one.
-                if pace > 0.0:
-                    speed_(rows, before, i, axes, half, pace, usual, keep)
-                if what == UNSEEN:
-                    unseen[i] += 1
-                else:
-                    own = gains[:, :, min(unseen[i], gains.shape[2] - 1)]
-                    right_(rows, i, axes, half, seen, own, h, e, out, what == COUNTED)
+    @njit(**options)
+    def begin(advance, rest, rows, before, start):  # type: ignore[no-untyped-def]
+        start[:] = before
+        advance(0, 0, 0, *rest)
+        rows[:, : before.shape[1]] = before
+
+    @njit(**options)
+    def filtered(  # type: ignore[no-untyped-def]
+        advance, rest, steps, rows, before, start, seen, state, speed, gains, out, kept, pushes, axes, half, pace, usual,
+        keep,
+    ):  # fmt: skip
+        e, unseen = np.zeros(3), np.zeros(state.shape[1], np.int64)
+        for k in range(state.shape[0]):
+            if k > 0:
+                advance((k - 1) * steps, k * steps, 0, *rest)
+                if pushes.shape[0] > 0:
+                    for i in range(state.shape[1]):
+                        size = 0.0
+                        for a in range(axes):
+                            size += before[axes + a, i] ** 2
+                        scale = math.sqrt(size) / pace if pace > 0.0 else 1.0
+                        for a in range(axes):
+                            pushes[k - 1, a, i] = rows[axes + a, i] * scale - before[axes + a, i]
+            # One individual after another; those who enter take the observed state, and absent ones
+            # wait beyond every range, each at a place of its own, so that no law meets them or
+            # divides by zero.
+            for i in range(state.shape[1]):
+                what = state[k, i]
+                if what in (ABSENT, ENTERS):
+                    for a in range(axes):
+                        rows[a, i] = seen[k, a, i] if what == ENTERS else AWAY * (2.0 + i)
+                        rows[axes + a, i] = speed[k, a, i] if what == ENTERS else 1.0
                     unseen[i] = 0
-            for a in range(2 * axes):
-                before[a, i] = rows[a, i]
+                else:
+                    # Before the correction: the step that is scaled is the predicted one.
+                    if pace > 0.0:
+                        speed_(rows, before, i, axes, half, pace, usual, keep)
+                    if what == UNSEEN:
+                        unseen[i] += 1
+                    else:
+                        gap = min(unseen[i], gains.shape[2] - 1)
+                        right_(rows, k, i, axes, half, seen, gains, gap, e, out, what == COUNTED)
+                        unseen[i] = 0
+                for a in range(2 * axes):
+                    before[a, i] = rows[a, i]
+                    if kept.shape[0] > 0:
+                        kept[k, a, i] = rows[a, i]
+            # Delayed or averaged percepts need states before the first frame; the first observed
+            # ones stand for them.
+            if k == 0:
+                begin(advance, rest, rows, before, start)
 
-    return kernel
+    @njit(**options)
+    def flown(  # type: ignore[no-untyped-def]
+        advance, rest, steps, rows, before, start, state, follow, generator, pushed, blurred, lasts, wander, axes, half,
+        usual, keep, out,
+    ):  # fmt: skip
+        error = np.zeros((axes, state.shape[1]))
+        for a in range(axes):
+            for i in range(state.shape[1]):
+                error[a, i] = blurred * generator.normal(0.0, 1.0)
+        for k in range(state.shape[0]):
+            # Noise that is no number of the law: pushes of the velocity, or errors of the position by
+            # which everybody decides and from which nobody moves.
+            for i in range(state.shape[1] if k > 0 else 0):
+                for a in range(axes):
+                    before[a, i], before[axes + a, i] = rows[a, i], rows[axes + a, i]
+                    rows[axes + a, i] += pushed * generator.normal(0.0, 1.0)
+                    error[a, i] = lasts * error[a, i]
+                    error[a, i] += math.sqrt(1.0 - lasts**2) * blurred * generator.normal(0.0, 1.0)
+                    rows[a, i] += error[a, i]
+            if k > 0:
+                advance((k - 1) * steps, k * steps, 0, *rest)
+            for i in range(state.shape[1]):
+                if k > 0:
+                    size = 0.0
+                    for a in range(axes):
+                        rows[a, i] -= error[a, i]
+                        size += before[axes + a, i] ** 2
+                    if wander >= 0.0:  # a law of headings: own speeds relax to the usual one, and wander
+                        own = usual + keep * (math.sqrt(size) - usual) + wander * generator.normal(0.0, 1.0)
+                        own = max(own, 0.05 * usual)
+                        for a in range(axes):
+                            step = rows[a, i] - before[a, i]
+                            if half[a] > 0.0:
+                                step -= 2.0 * half[a] * round(step / (2.0 * half[a]))
+                            rows[a, i] = before[a, i] + own / usual * step
+                            rows[axes + a, i] *= own / usual
+                # Who enters or is absent follows the record, so that flights have the gaps of the tracks.
+                if k == 0 or state[k, i] == ABSENT or state[k, i] == ENTERS:
+                    for a in range(2 * axes):
+                        rows[a, i] = follow[k, a, i]
+            if k == 0:
+                before[:] = rows[:, : before.shape[1]]
+                begin(advance, rest, rows, before, start)
+            out[k] = rows[:, : before.shape[1]]
+
+    return njit(**options)(fly_straight), filtered, flown
 
 
 # A smoother of both sides contains the future, one of the past lags and flattens slopes. The step
@@ -153,14 +242,12 @@ class InnovationFilter:
         self.seen = np.where(np.isfinite(tracks.seen), tracks.seen, 0.0)
         n = tracks.individual_count
         self.out = np.zeros((len(self.seen), tracks.axes, n))
-        self.previous_states, self.frames_unseen = np.zeros((2 * tracks.axes, n)), np.zeros(n, np.int64)
+        self.previous_states, self.start = np.zeros((2 * tracks.axes, n)), np.zeros((2 * tracks.axes, n))
         self.half_sides = np.array([*tracks.box[: tracks.axes], *[0.0] * (3 - tracks.axes)])
-        self.rows = np.zeros((2 * tracks.axes, n))
-        self.step = 0
+        self.rows, self.steps = np.zeros((2 * tracks.axes, n)), 1
         if law is not None:
             self.flight = law.state(tracks)
-            self.row = self.flight.arrays["row"].copy()
-            self.fresh = self.flight.buffer.copy()
+            self.fresh, self.start = self.flight.buffer.copy(), self.flight.start
             self.steps = max(1, round(tracks.period / law.scenario.flight.dt))
             rows = self.flight.driver.ROWS
             places = [rows[name] for name in (*law.plan.axes, *(f"v{axis}" for axis in law.plan.axes))]
@@ -184,88 +271,31 @@ class InnovationFilter:
         kept    : (frame, component, individual), filled with positions (m) and velocities (m/s) as put right
         pushes  : (frame, axis, individual), filled with the change of velocity by the next frame that is predicted, m/s
         """
-        kernel, tracks, table = _kernel(), self.tracks, gains.table(self.tracks.period)
-        law = self.law
-        pace = mean_speed if law is None or law.commands_heading else 0.0
-        self.out[:] = 0.0
+        tracks, table, none = self.tracks, gains.table(self.tracks.period), np.zeros((0, 0, 0))
+        pace = mean_speed if self.law is None or self.law.commands_heading else 0.0
         # Spans are independent: each begins with a clean memory of the driver, so any subset gives
         # the same differences.
         for number in range(len(tracks.spans)) if spans is None else spans:
-            begin, end = tracks.spans[number]
-            self.begin(numbers)
-            for k in range(begin, end):
-                if k > begin:
-                    self.fly(mean_speed)
-                    if pushes is not None:
-                        self._pushes(pushes[k - 1], pace)
-                kernel(
-                    self.rows,
-                    self.previous_states,
-                    self.frames_unseen,
-                    self.seen[k],
-                    tracks.state[k],
-                    tracks.speed[k],
-                    table,
-                    self.out[k],
-                    self.axes,
-                    self.half_sides,
-                    pace,
-                    mean_speed,
-                    gains.keep,
-                )
-                # Delayed or averaged percepts need states before the first frame; the first
-                # observed ones stand for them.
-                if k == begin:
-                    self.fill_past_states(self.previous_states)
-                if kept_states is not None:
-                    kept_states[k] = self.previous_states
+            part = slice(*tracks.spans[number])
+            self.out[part] = 0.0
+            compiled_loops()[1](
+                *self.begin(numbers, mean_speed), self.seen[part], tracks.state[part], tracks.speed[part], table,
+                self.out[part], none if kept_states is None else kept_states[part],
+                none if pushes is None else pushes[part], self.axes, self.half_sides, pace, mean_speed, gains.keep,
+            )  # fmt: skip
         return self.out
 
-    def _pushes(self, found: Array, pace: float) -> None:
-        """Return changes of velocity in the last period."""
-        was, new = self.previous_states[self.axes :], self.now()[self.axes :]
-        scale = np.sqrt((was**2).sum(axis=0)) / pace if pace > 0.0 else 1.0
-        found[:] = new * scale - was
-
-    def begin(self, numbers: dict[int, float], world: int = 0) -> None:
-        """Forget the span before. world : number of the random world, where there is noise."""
-        self.step = 0
+    def begin(self, numbers: dict[int, float], mean_speed: float, world: int = 0) -> tuple[Any, ...]:
+        """Forget the span before; return the driver and its memory. world : number of the random world of the law."""
+        memory = self.rows, self.previous_states, self.start
         if self.law is None:
-            return
+            return compiled_loops()[0], (self.rows, self.axes, mean_speed, self.tracks.period), 1, *memory
         self.flight.buffer[:] = self.fresh
         self.flight.set_integer("world", world)
         row = self.flight.arrays["row"]
         for column, value in numbers.items():
             row[column] = value
-
-    def fill_past_states(self, motion: Array) -> None:
-        """Start the driver with the present individuals: past states that arrive late are filled with their states.
-
-        motion : positions (m) and velocities (m/s), (component, individual)
-        """
-        if self.law is not None:
-            self.flight.start[:] = motion
-            self.flight.advance(0, 0)
-        self.now()[:] = motion
-
-    def now(self) -> Array:
-        """Return a view of positions and velocities in the flight, (component, individual)."""
-        return self.rows[:, : self.tracks.individual_count]
-
-    def fly(self, mean_speed: float) -> None:
-        """Fly for one period of the tracks."""
-        if self.law is None:
-            self._straight(mean_speed)
-            return
-        self.flight.advance(self.step, self.step + self.steps)
-        self.step += self.steps
-
-    def _straight(self, usual: float) -> None:
-        """Move everybody straight on for a period."""
-        axes = self.axes
-        speed = np.sqrt((self.rows[axes:] ** 2).sum(axis=0)) + 1e-30
-        self.rows[axes:] *= usual / speed
-        self.rows[:axes] += self.rows[axes:] * self.tracks.period
+        return self.flight.driver.advance, self.flight.arguments(0, 0)[3:], self.steps, *memory
 
 
 # The likelihood: surprise at the next frames under a law with its numbers and the gains of the

@@ -147,7 +147,7 @@ def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Sce
         raise ScenarioError([f"{what!r} is not a law; give a name of ours, a preset, a scenario file or a Scenario"])
     if what in MODELS or str(what).endswith(".py"):
         open_air = {"model": {"kind": str(what)}, "world": {"arena": "none"}, "radio": {"delay": 0.0}}
-        open_air["start"] = {"kind": "ball", "separation": 0.0}
+        open_air["start"] = {"kind": "ball", "radius": 1e-3, "separation": 0.0}  # of no consequence; fits any dish
         return build_scenario(open_air, str(what), settings, trust=trust or str(what).endswith(".py"))
     if what not in presets() and not expand_path(what).is_file():
         hint = suggest(what, [*MODELS, *presets()], f"; laws: {', '.join(MODELS)}", lead="; ", cutoff=0.4)

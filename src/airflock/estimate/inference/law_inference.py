@@ -376,14 +376,34 @@ def infer(
     >>> found.verdict  # doctest: +SKIP
     'couzin_2002 explains the tracks best'
     """
+    result, comparison, model = name_law(tracks, models, settings, seed=seed, trust=trust, done=done)
+    if result.best is not None and model is not None:
+        best, say = result.best, done or (lambda _: None)
+        teller = _teller(say, f"{best.name}, flown again")
+        corrected = correct_fit(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
+        set_parameters(result, model, corrected)
+        if check:
+            result.check = run_predictive_check(model, corrected.place, corrected.noise, check, _teller(say, "check"))
+    return result
+
+
+def name_law(
+    tracks: Any,
+    models: Sequence[str | Scenario],
+    settings: Mapping[str, Any] | None = None,
+    *,
+    seed: int = 0,
+    trust: bool = False,
+    done: Callable[[str], None] | None = None,
+) -> tuple[InferResult, "_Comparison", FitModel | None]:
+    """Return the result of `infer` before its intervals and flights, the comparison, and the model of the best law."""
     models = [models] if isinstance(models, str) else models
     if not isinstance(models, Iterable):
         raise AirflockError(f"infer: models = {models!r}: give a list of laws, such as ['couzin_2002']")
     if not models:
         raise AirflockError("infer: no laws to choose from; name models, such as couzin_2002")
     say = done or (lambda _: None)
-    settings = dict(settings or {})
-    scenarios, box = law_scenarios(models, settings, trust=trust)
+    scenarios, box = law_scenarios(models, dict(settings or {}), trust=trust)
     recordings = read_recordings(tracks)
     followed = [tracks_from_recording(recording, name, box=box) for name, recording in recordings]
     _alike(followed)
@@ -396,17 +416,10 @@ def infer(
         max(each.individual_count for each in followed),
     )  # fmt: skip
     if best is None:
-        return result
+        return result, comparison, None
     comparison.contest(laws, by_name)
     result.best, result.verdict = judge_laws(laws)
-    if result.best is not None:
-        best, model = result.best, by_name[result.best.name]
-        teller = _teller(say, f"{best.name}, flown again")
-        corrected = correct_fit(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
-        set_parameters(result, model, corrected)
-        if check:
-            result.check = run_predictive_check(model, corrected.place, corrected.noise, check, _teller(say, "check"))
-    return result
+    return result, comparison, by_name[result.best.name] if result.best else None
 
 
 class _Comparison:

@@ -1,5 +1,6 @@
 """Correct bias and intervals of a fit by flights of the fitted law (a parametric bootstrap)."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.estimate.inference.identifiability import Ridges, profile_ridges, ridges_of_dropped
-from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter
+from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter, compiled_loops
 from airflock.estimate.inference.law_candidates import LawCandidate
 from airflock.estimate.inference.likelihood_fit import (
     CENTRAL_SLOPES,
@@ -21,8 +22,7 @@ from airflock.estimate.inference.likelihood_fit import (
     standard_errors,
 )
 from airflock.estimate.inference.observed_tracks import (
-    ABSENT,
-    ENTERS,
+    UNSEEN,
     SpanTracks,
     with_positions,
 )
@@ -59,54 +59,33 @@ class FitNoise:
         return replace(self, law=law, speed=speed, seen=seen)
 
 
-class NoisyFlight:
-    """A flight of a fitted law with its noise, period by period of the tracks.
+def fly_span(
+    walk: InnovationFilter,
+    fitted: tuple[dict[int, float], FilterGains, float],
+    noise: FitNoise,
+    state: NDArray[np.int8],
+    follow: Array,
+    world: int,
+    generator: np.random.Generator,
+) -> Array:
+    """Fly the law with its noise; return positions (m) and velocities (m/s), (frame, component, individual).
 
-    place : numbers by column, gains, usual speed (`Model.split`)
+    fitted : numbers by column, gains, usual speed (`FitModel.split`)
+    state  : (frame, individual); who enters or is absent follows the record
+    follow : as what is returned: states of the record, of which the first frame is the start
+    world  : number of the random world of the law
     """
-
-    def __init__(
-        self, walk: InnovationFilter, fitted: tuple[dict[int, float], FilterGains, float], noise: FitNoise, seed: int
-    ):
-        numbers, self.gains, self.mean_speed = fitted
-        self.walk, self.noise, self.generator = walk, noise, np.random.default_rng(seed)
-        self.columns = {**numbers, **({noise.column: noise.law} if noise.column >= 0 else {})}
-        self.shape = walk.axes, walk.tracks.individual_count
-        self.own_speed = walk.law is not None and walk.law.commands_heading
-        self.error: Array | None = None  # of everybody's position as it is perceived, m
-
-    def begin(self, world: int) -> None:
-        """Forget the flight before. world : number of the random world of the law."""
-        if self.noise.column == BLURRED:
-            self.error = self.generator.normal(0.0, self.noise.law, self.shape)
-        self.walk.begin(self.columns, world=world)
-
-    def step(self, speed: Array | None = None) -> Array | None:
-        """Fly for one period. Returns own speeds (individual,) after it, m/s, where they are the individuals' own.
-
-        speed : own speeds before it, by default those of the velocities
-        """
-        walk, axes = self.walk, self.walk.axes
-        was = walk.now().copy()
-        # Three kinds of noise: pushes of the velocity, errors of perceived positions, or a number
-        # of the law itself.
-        if self.noise.column == PUSHED:
-            walk.now()[axes:] += self.generator.normal(0.0, self.noise.law, self.shape)
-        if self.error is None:
-            walk.fly(self.mean_speed)
-        else:  # everybody decides by displaced positions, and moves from the true one
-            lasts = float(np.exp(-walk.tracks.period / LASTING))
-            draws = self.generator.normal(0.0, self.noise.law, self.shape)
-            self.error = lasts * self.error + np.sqrt(1.0 - lasts**2) * draws
-            walk.now()[:axes] += self.error
-            walk.fly(self.mean_speed)
-            walk.now()[:axes] -= self.error
-        if not self.own_speed:
-            return None
-        speed = np.linalg.norm(was[axes:], axis=0) if speed is None else speed
-        speed = next_speed(speed, self.gains.keep, self.mean_speed, self.noise.speed, self.generator)
-        stretch_last_step(walk, was, speed / self.mean_speed)
-        return speed
+    numbers, gains, usual = fitted
+    columns = {**numbers, **({noise.column: noise.law} if noise.column >= 0 else {})}
+    own_speed = walk.law is not None and walk.law.commands_heading
+    flown = np.zeros((len(state), 2 * walk.axes, walk.tracks.individual_count))
+    compiled_loops()[2](
+        *walk.begin(columns, usual, world), state, follow, generator,
+        noise.law if noise.column == PUSHED else 0.0, noise.law if noise.column == BLURRED else 0.0,
+        math.exp(-walk.tracks.period / LASTING), noise.speed if own_speed else -1.0, walk.axes, walk.half_sides, usual,
+        gains.keep, flown,
+    )  # fmt: skip
+    return flown
 
 
 def fly_tracks(
@@ -119,51 +98,19 @@ def fly_tracks(
 ) -> SpanTracks:
     """Fly the law from the beginning of each span, and return tracks of these flights.
 
-    place : numbers by column, gains, usual speed (`Model.split`); kept : where individuals were (`Walk.errors`)
+    fitted : numbers by column, gains, usual speed (`FitModel.split`)
+    filtered_states : where individuals were (`InnovationFilter.errors`)
     """
-    tracks, axes = walk.tracks, walk.axes
-    flight = NoisyFlight(walk, fitted, noise, seed)
+    tracks, generator = walk.tracks, np.random.default_rng(seed)
     seen = np.full_like(tracks.seen, np.nan)
     # Each span has a world of its own; 1009 is prime, so that seeds and spans do not meet.
     for s in spans:
-        begin, end = tracks.spans[s]
-        flight.begin((seed * 1009 + s + 1) % 2**31)
-        for k in range(begin, end):
-            state = tracks.state[k]
-            if k > begin:
-                flight.step()
-            # Who enters or is absent follows the record, so that the flight has the gaps of the
-            # tracks.
-            enters = (state == ENTERS) | (state == ABSENT)
-            walk.now()[:, enters] = filtered_states[k][:, enters]
-            if k == begin:
-                walk.fill_past_states(walk.now().copy())
-            there = state > 1
-            noisy = walk.now()[:axes] + flight.generator.normal(0.0, noise.seen, flight.shape)
-            seen[k][:, there] = noisy[:, there]
+        part = slice(*tracks.spans[s])
+        world = (seed * 1009 + s + 1) % 2**31
+        flown = fly_span(walk, fitted, noise, tracks.state[part], filtered_states[part], world, generator)
+        noisy = flown[:, : walk.axes] + generator.normal(0.0, noise.seen, seen[part].shape)
+        seen[part] = np.where((tracks.state[part] > UNSEEN)[:, None], noisy, np.nan)
     return with_positions(tracks, seen)
-
-
-def next_speed(
-    speed: Array, persistence: float, mean_speed: float, noise: float, generator: np.random.Generator
-) -> Array:
-    """Return own speeds (individual,) a period later, m/s: they relax to the usual one, and wander.
-
-    persistence : share of a difference from the usual speed that is left; noise : standard deviation of a period's
-                  change
-    """
-    found: Array = mean_speed + persistence * (speed - mean_speed) + generator.normal(0.0, noise, len(speed))
-    return np.maximum(found, 0.05 * mean_speed)
-
-
-def stretch_last_step(walk: InnovationFilter, previous: Array, factor: Array) -> None:
-    """Make the last step of each individual so many times as long, and its velocity as large.
-
-    was : (component, individual), positions and velocities before the step
-    """
-    now, axes = walk.now(), walk.axes
-    now[:axes] = previous[:axes] + factor * walk.tracks.nearest(now[:axes] - previous[:axes])
-    now[axes:] *= factor
 
 
 def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
