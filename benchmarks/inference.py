@@ -21,7 +21,7 @@ from airflock.estimate.inference import law_inference
 
 SETS = {"development": 0, "judging": 1000, "walks": 2000}
 FAMILIES = ("vicsek", "couzin", "boids", "vasarhelyi", "nearest")
-OFF = 1e-12
+OFF, FINE = 1e-12, 5  # steps of the motion between decisions
 
 
 def lengths(d):
@@ -81,8 +81,9 @@ def couzin(g, n, frames, period, size):
         wanted = np.where(close.any(axis=1)[:, None], -(close[:, :, None] * towards).sum(axis=1), wanted)
         length = np.linalg.norm(wanted, axis=1, keepdims=True)
         wanted = np.where(length > 1e-9, wanted / np.maximum(length, 1e-9), h) + sigma * g.normal(size=(n, 2))
-        angle = turn_to(angle, wanted, turn * period)
-        x = x + speed * period * headings(angle)
+        for _ in range(FINE):
+            angle = turn_to(angle, wanted, turn * period / FINE)
+            x = x + speed * period / FINE * headings(angle)
     truth = {"model.r_r": r_r, "model.dr_o": dr_o, "model.dr_a": dr_a, "model.fov_deg": fov, "model.sigma": sigma}
     return out, truth | {"body.speed": speed, "body.turn": turn}, {}
 
@@ -116,8 +117,9 @@ def boids(g, n, frames, period, size):
         match = ((others & (r <= r_a))[:, :, None] * (v[None] - v[:, None])).sum(axis=1)
         force = shorten(w_c * unit(pull) + w_s * unit(away.sum(axis=1)) + w_a * unit(match), most)
         smooth = smooth + k * (force - smooth)
-        v = shorten(v + period * smooth + push * g.normal(size=(n, 2)), fastest)
-        x = x + period * v
+        for _ in range(FINE):
+            v = shorten(v + period / FINE * smooth + push / np.sqrt(FINE) * g.normal(size=(n, 2)), fastest)
+            x = x + period / FINE * v
     truth = {"model.r_s": r_s, "model.r_a": r_a, "model.r_c": r_c, "model.w_c": 100.0 * w_c, "model.w_s": 100.0 * w_s}
     return out, truth | {"model.w_a": 100.0 * w_a, "model.f_m": most, "body.speed_max": fastest}, {}
 
@@ -129,13 +131,13 @@ def brake(room, a, p):
 
 
 def vasarhelyi(g, n, frames, period, size):
-    """Vásárhelyi et al. 2018 within walls; multirotors with a lag, a limit and noise, integrated at a fifth."""
+    """Vásárhelyi et al. 2018 within walls; multirotors with a lag, a limit and noise."""
     flock, r0_rep, p_rep = g.uniform(2.0, 4.0), g.uniform(5.0, 10.0), g.uniform(0.15, 0.5)
     r0_frict, c_frict, v_frict = g.uniform(5.0, 15.0), g.uniform(0.05, 0.2), g.uniform(0.2, 0.6)
     p_frict, a_frict, tau, a_max, noise = g.uniform(1.0, 3.0), g.uniform(1.0, 4.0), g.uniform(0.4, 0.9), 5.0, 0.1
     half, wall, v_wall, p_wall, a_wall = 30.0, 1.0, 8.0, 2.0, 3.0
     x, v = g.uniform(-20.0, 20.0, (n, 2)), g.normal(0.0, 1.0, (n, 2))
-    out, fine = np.zeros((frames, n, 2)), 0.2 * period
+    out, fine = np.zeros((frames, n, 2)), period / FINE
     for frame in range(-100, frames):
         if frame >= 0:
             out[frame] = x
@@ -156,7 +158,7 @@ def vasarhelyi(g, n, frames, period, size):
             k = np.maximum(size_ - brake(gap - wall, a_wall, p_wall), 0.0) / size_
             wanted = wanted + k[:, None] * shill
         wanted = flock * unit(wanted)
-        for _ in range(5):
+        for _ in range(FINE):
             v = v + fine * shorten((wanted - v) / tau, a_max) + np.sqrt(2.0 * noise * fine) * g.normal(size=(n, 2))
             x = x + fine * v
     truth = {"model.v_flock": flock, "model.r0_rep": r0_rep, "model.p_rep": p_rep, "model.r0_frict": r0_frict}
@@ -225,7 +227,9 @@ def run(which, number, naming):
     best = result.best
     row = {"number": number, "family": family, "best": best and best.name, "verdict": result.verdict}
     row["right"] = row["best"] == LAWS_OF.get("vicsek" if family == "nearest" else family)
-    row["laws"] = {law.name: [round(law.gain, 1), round(law.error, 1), round(law.ahead, 2)] for law in result.laws}
+    row["laws"] = {
+        law.name: [round(law.gain, 1), round(law.error, 1), round(law.ahead, 2), law.by_chance] for law in result.laws
+    }
     if best is not None and not naming:
         told = {k: n for k, n in best.numbers.items() if k in truth and not (n.low is None and n.high is None)}
         row["told"] = len(told)

@@ -25,6 +25,7 @@ from airflock.estimate.identification.vehicle_identification import (
     HARDER,
     KEY_UNITS,
     IdentifiedParameter,
+    _on_one_clock,
     flight_card,
     identify,
     read_heard,
@@ -395,6 +396,55 @@ def test_the_curve_of_reception_comes_back():
     near = heard_by(k)[0]
     near = near[near["distance"] < 40.0]
     assert {"far", "received_far"} <= set(packets.fit_links(near, 0.2, k).refused)  # both lie beyond what was flown
+
+
+def pairs_by_sequence(seed, k, drones=3, rate=10.0, seconds=600.0):
+    """Logs of drones that swing apart and together, and the packets that came: rx, tx, seq and two times."""
+    g = np.random.default_rng(seed)
+    time = np.arange(0.0, seconds, 0.1)
+    swing = [0.5 * (d - 1) * (70.0 + 65.0 * np.sin(0.05 * time)) for d in range(drones)]
+    names = [f"d{d}" for d in range(drones)]
+    place = np.concatenate([np.stack([x, np.zeros_like(x)], axis=1) for x in swing])
+    who = np.repeat(np.arange(drones), len(time))
+    none = np.full_like(place, np.nan)
+    logs = FlightLogs(np.tile(time, drones), place, none, none, who, np.tile(time == 0.0, drones), names, who < 0)
+    ahead, rows, every = g.normal(0.0, 2.0, drones), [], []
+    for sender in range(drones):
+        sent = np.arange(0.5, seconds - 1.0, 1.0 / rate)
+        for receiver in (d for d in range(drones) if d != sender):
+            apart = np.abs(np.interp(sent, time, swing[sender]) - np.interp(sent, time, swing[receiver]))
+            came = g.random(len(sent)) < [links.received(d, 0.0, k) for d in apart]
+            every.append(pd.DataFrame({"distance": apart, "got": came.astype(float), "fast": 1.0, "slow": 0.0}))
+            part = {"rx": names[receiver], "tx": names[sender], "seq": np.arange(len(sent)) % 4096,
+                    "t_rx": sent + 0.05 + ahead[receiver], "t_tx": sent + ahead[sender]}  # fmt: skip
+            rows.append(pd.DataFrame(part)[came])
+    logs = replace(logs, time=logs.time + ahead[who])
+    return logs, pd.concat(rows, ignore_index=True), pd.concat(every, ignore_index=True)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gaps_of_a_counter_are_losses_and_distances_come_from_the_positions(seed):
+    k = links.Parameters(kind="links", near=25.0, far=70.0, received_near=0.95, received_far=0.4)
+    logs, came, every = pairs_by_sequence(seed, k)
+    heard = packets.check_packets(came)
+    aligned, comparable = _on_one_clock(logs, heard)
+    found, notes = packets.lost_by_sequence(heard, aligned, comparable)
+    assert "losses from gaps of seq" in notes[0] and "seq starts again" in notes[1]  # the counter ends at 4096
+    # what is lost before the first and after the last packet that came, and where the counter starts again, is unknown
+    assert len(every) - 60 <= len(found) <= len(every)
+    assert found["got"].sum() == every["got"].sum() and found["distance"].max() < every["distance"].max() + 0.1
+    for low in range(0, 130, 10):  # by distance, the same shares as were drawn
+        own, truth = (t["got"][(t["distance"] >= low) & (t["distance"] < low + 10)] for t in (found, every))
+        assert own.mean() == pytest.approx(truth.mean(), abs=0.02), (seed, low)
+    curve = packets.fit_links(found, 0.1, k)
+    assert abs(curve.value["far"] / 70.0 - 1.0) < 0.15, (seed, curve.value)
+
+
+def test_clocks_of_their_own_are_noted_and_agreeing_ones_are_not():
+    logs, came, _ = pairs_by_sequence(1, links.Parameters(kind="links"))
+    assert packets.clocks_apart(packets.fit_delay(packets.check_packets(came))) > 1.0
+    agreeing = came.assign(t_tx=came["seq"] / 10.0, t_rx=came["seq"] / 10.0 + 0.05)
+    assert packets.clocks_apart(packets.fit_delay(packets.check_packets(agreeing))) == 0.0
 
 
 @pytest.mark.parametrize("error", [0.0, 3.0])

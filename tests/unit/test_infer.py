@@ -19,7 +19,7 @@ from airflock.estimate.inference import (
     parametric_bootstrap as flights,
     parametric_bootstrap as noise,
 )
-from airflock.estimate.inference.innovation_filter import FilterGains, InnovationFilter, compiled_loops
+from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter
 from airflock.estimate.inference.law_inference import InferResult, LawResult, judge_laws
 from airflock.estimate.inference.observed_tracks import (
     ABSENT,
@@ -27,8 +27,10 @@ from airflock.estimate.inference.observed_tracks import (
     ENTERS,
     SEEN,
     UNSEEN,
+    shifted_in_time,
     tracks_from_recording,
     tracks_scale,
+    with_positions,
 )
 from airflock.support.errors import AirflockError, RecordingError
 from processes import called
@@ -45,7 +47,7 @@ def dataset(place):
     return xr.Dataset({"position": (tuple(coordinates), place.transpose(0, 2, 1)[:, :, None, :])}, coordinates)
 
 
-def vicsek(agents=10, frames=300, eta=0.8, seed=3, noise=0.01, missing=0.02):
+def vicsek(agents=10, frames=300, eta=0.8, seed=3, noise=0.01, missing=0.02, k=None):
     """Tracks by Eqs 1-2 of Vicsek et al. 1995 in NumPy, without the engine: turn to the mean heading, then move."""
     g = np.random.default_rng(seed)
     x, angle = g.uniform(-0.5 * SIDE, 0.5 * SIDE, (agents, 2)), g.uniform(-np.pi, np.pi, agents)
@@ -54,7 +56,8 @@ def vicsek(agents=10, frames=300, eta=0.8, seed=3, noise=0.01, missing=0.02):
         rows.append(x.copy())
         d = x[None] - x[:, None]
         d -= SIDE * np.round(d / SIDE)
-        near = (d**2).sum(axis=2) <= RADIUS**2
+        r2 = (d**2).sum(axis=2)
+        near = r2 <= (RADIUS**2 if k is None else np.sort(r2, axis=1)[:, k, None])
         mean = (near[:, :, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)[None]).sum(axis=1)
         angle = np.arctan2(mean[:, 1], mean[:, 0]) + eta * (g.random(agents) - 0.5)
         x = x + SPEED * PERIOD * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -112,6 +115,37 @@ def test_walks_at_random_are_explained_by_none():
         found.document()
 
 
+@pytest.mark.usefixtures("brief")
+def test_numbers_and_thresholds_of_one_half_know_nothing_of_the_other():
+    """A fit of everything, fitted again without a part, explained walks at random by what that part had chosen."""
+    tracks = tracks_from_recording(vicsek(frames=200), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
+    scale = tracks_scale([tracks])
+    law = candidates.make_candidate(candidates.law_scenarios(["vicsek_1995"], BOX)[0][0], scale, 2)
+    _, straight = select.straight_model([tracks], scale)
+    halves = select.make_halves(FitModel(law, [tracks], scale))
+    assert sorted(halves[0] + halves[1]) == list(range(len(tracks.spans))) and abs(len(halves[0]) - len(halves[1])) < 2
+    other = tracks.seen.copy()
+    for s in halves[1]:
+        other[slice(*tracks.spans[s])] = np.random.default_rng(s).uniform(
+            -2.0, 2.0, other[slice(*tracks.spans[s])].shape
+        )
+    one, two = (
+        select.fit_law(law, [each], scale, straight.place[1:], 0, halves[0], lambda: None)[1]
+        for each in (tracks, with_positions(tracks, other))
+    )
+    assert np.array_equal(one.place, two.place) and one.loss == two.loss
+
+
+def test_individuals_shifted_in_time_move_as_they_did_and_meet_nobody():
+    tracks = tracks_from_recording(vicsek(eta=0.0, frames=300, missing=0.0), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
+    shifted = shifted_in_time(tracks)
+    for i in range(tracks.individual_count):
+        there = np.isfinite(shifted.seen[:, 0, i])
+        assert there.mean() > 0.95 and (shifted.state[~there, i] < COUNTED).all()
+        own = {tuple(x) for x in tracks.seen[:, :, i]}
+        assert all(tuple(x) in own for x in shifted.seen[there, :, i])
+
+
 def test_a_quiet_flock_is_predicted_exactly_by_its_own_law():
     tracks = tracks_from_recording(
         vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0)
@@ -140,8 +174,10 @@ def test_one_compiled_walk_over_all_frames_is_its_text_in_plain_python_and_spans
         assert np.array_equal(walk.errors(numbers, gains, SPEED, [number])[part], whole[part])
         own = np.zeros_like(whole[part])
         none, pace = np.zeros((0, 0, 0)), SPEED if law is None or candidate.commands_heading else 0.0
-        compiled_loops()[1].py_func(
-            *walk.begin(numbers, SPEED), walk.seen[part], tracks.state[part], tracks.speed[part],
+        walk.unseen[:] = 0
+        walk.loops.filter_span.py_func(
+            *walk.begin(numbers, SPEED), walk.unseen, walk.scratch, walk.seen[part], tracks.state[part],
+            tracks.speed[part],
             gains.table(tracks.period), own, none, none, 2, walk.half_sides, pace, SPEED, gains.keep,
         )  # fmt: skip
         assert own == pytest.approx(whole[part], abs=1e-12)
@@ -192,6 +228,71 @@ def test_flights_of_the_posterior_check_perceive_with_errors_and_are_not_pushed_
     )
     for name, values in quiet.items():
         assert blurred[name] == pytest.approx(values, rel=1e-6), name
+
+
+@pytest.mark.parametrize("k", [2, 4, 6])
+def test_the_number_of_nearest_neighbours_that_made_the_tracks_is_the_likeliest(k):
+    tracks = tracks_from_recording(vicsek(agents=20, k=k, eta=1.2), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
+    scale = tracks_scale([tracks])
+    named, _ = candidates.law_scenarios(["vicsek_1995"], BOX, ["metric", "nearest"])
+    assert [each.name for each in named] == ["vicsek_1995", "vicsek_1995, nearest"]
+    best = {}
+    for each in named:
+        model = FitModel(candidates.make_candidate(each, scale, 2), [tracks], scale)
+        at = {n.key: i for i, n in enumerate(model.numbers[: model.named])}
+
+        def loss(key, value, model=model, at=at):
+            u = model.first()
+            for name, own in {**NUMBERS, "model.r": 1e9, key: value}.items():
+                if name in at:
+                    u[at[name]] = model.numbers[at[name]].place(own)
+            return model.score(u).loss()
+
+        key = "topology.k" if "nearest" in each.name else "model.r"
+        values = range(1, 13) if key == "topology.k" else np.linspace(0.3, 3.0, 28)
+        losses = [loss(key, value) for value in values]
+        best[key] = values[int(np.argmin(losses))], min(losses)
+    assert best["topology.k"][0] == k and best["topology.k"][1] < best["model.r"][1] - 20.0
+
+
+def test_neighbourhoods_that_there_are_not_are_one_line():
+    with pytest.raises(AirflockError, match="--topologies topological: choose from metric, nearest, voronoi"):
+        candidates.law_scenarios(["vicsek_1995"], BOX, ["topological"])
+
+
+def test_one_flight_in_twenty_of_the_law_itself_is_flagged():
+    """By the extremes of 20 flights it was one in three."""
+    g, flagged = np.random.default_rng(11), 0
+    for _ in range(1000):
+        logits, logs = g.normal(1.0, 1.0, (2, 21)), g.normal(-1.0, 0.5, (3, 21))
+        rows = dict(zip(predictive.MEANINGS, [*(1.0 / (1.0 + np.exp(-logits))), *np.exp(logs)], strict=True))
+        ends = {name: predictive.prediction_ends(name, row[1:]) for name, row in rows.items()}
+        check = predictive.PredictiveCheck({name: (row[0], *ends[name]) for name, row in rows.items()})
+        flagged += bool(check.outside())
+    assert 20 <= flagged <= 80
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_interval_of_noise_holds_its_own_value_and_what_it_was(seed):
+    """An end that equalled the value was moved past it: 0.1716 stood beside 0.1892 to 0.1896."""
+    g = np.random.default_rng(seed)
+    value = float(np.exp(g.normal()))
+    ends = tuple(float(np.exp(end)) for end in np.log(value) + g.choice([-0.1, 0.0, 0.1], 2))
+    low, high = noise.widened_ends(value, ends, 0.1)
+    assert low < value < high and low < ends[0] and ends[1] < high, seed
+    assert noise.widened_ends(value, (None, None), 0.1) == (None, None)
+
+
+def test_a_scenario_starts_as_wide_as_the_tracks_did():
+    """Five times too wide, a shoal of 0.03 m never met, and flew on with a polarisation of 0.16."""
+    g = np.random.default_rng(3)
+    for axes, radius in ((2, 0.03), (3, 2.0)):
+        place = g.normal(size=(400, axes))
+        place *= radius * g.random((400, 1)) ** (1.0 / axes) / np.linalg.norm(place, axis=1, keepdims=True)
+        drift = np.arange(130)[:, None, None] * g.normal(size=(400, axes)) * radius  # they part for good
+        scale = tracks_scale([tracks_from_recording(dataset(place + drift))])
+        assert scale.begin == pytest.approx(radius, rel=0.05) and scale.far > 10.0 * radius
+        assert scale.length == pytest.approx(13.0)
 
 
 NUMBERS = {"model.r": RADIUS, "body.speed": SPEED, "body.turn": 60.0}

@@ -85,12 +85,10 @@ def test_a_law_that_cannot_be_told_from_the_best_is_searched_as_deeply(monkeypat
     deep = {"wrong": law_that("wrong", 31.0, -0.01, 2.0), "true": law_that("true", 90.0, -6.0, 3.0)}
     comparison, searched = object.__new__(_Comparison), []
 
-    def deeper(law, model):
-        searched.append(law.name)
-        return f"deep {model}", deep[law.name]
+    def deeper(name):
+        searched.append(name)
+        return deep[name]
 
     monkeypatch.setattr(comparison, "deeper", deeper, raising=False)
-    models = {each.name: each.name for each in shallow}
-    comparison.contest(shallow, models)
+    comparison.contest(shallow)
     assert searched == ["wrong", "true"] and [law.name for law in shallow] == ["true", "wrong", "far"]
-    assert models == {"wrong": "deep wrong", "true": "deep true", "far": "far"}

@@ -304,6 +304,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         {
             "tracks": "tracks",
             "models": "models",
+            "topologies": "topologies",
             "changes": "settings",
             "flights": "check",
             "seed": "seed",

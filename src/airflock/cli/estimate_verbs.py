@@ -320,6 +320,8 @@ def _parameter_table(result: Any) -> None:
     console = Console()
     if result.settings():
         console.print(_numbers_table(result))
+        if result.log_noise is not None:
+            console.print(f"noise of logged velocities {result.log_noise:.3g} m/s per axis", highlight=False)
         console.print("not identified, kept from --like:")
     else:
         console.print(
@@ -401,7 +403,10 @@ def _identified_json(result: Any, check: Any) -> dict[str, Any]:
     }  # fmt: skip
     checks = {} if check is None else {k: {"log": o, "low": lo, "high": hi} for k, (o, lo, hi) in check.found.items()}
     card = [part._asdict() for part in flight_card(result.like)]
-    return {"like": result.like.name, "numbers": numbers, "check": checks, "plan": card, "notes": result.notes}
+    return {
+        "like": result.like.name, "numbers": numbers, "noise_of_log": result.log_noise, "check": checks, "plan": card,
+        "notes": result.notes,
+    }  # fmt: skip
 
 
 DEFAULT_LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
@@ -424,6 +429,13 @@ def infer(
             help="Laws by name, presets, scenario files, or files with laws of your own.",
         ),
     ] = DEFAULT_LAWS,
+    topologies: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND,...",
+            help="Neighbourhoods by which each law is tried: metric (its own), nearest (k is fitted), voronoi.",
+        ),
+    ] = "metric",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE.toml", help="Scenario to write, with the law found.")
     ] = None,
@@ -457,7 +469,10 @@ def infer(
     errors += [f"{path}: no such file" for path in tracks if not path.exists()]
     options.raise_errors(errors)
     with _fit_progress(as_json) as done:
-        result = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
+        result = find(
+            tracks, laws, settings=settings, topologies=[kind.strip() for kind in topologies.split(",")],
+            check=flights, seed=seed, trust=trust, done=done,
+        )  # fmt: skip
     if plot is not None:
         from airflock.view import plot_inferred, save_figure
 
@@ -552,7 +567,7 @@ def _check(result: Any) -> None:
 def _inferred_json(result: Any) -> dict[str, Any]:
     """Return the result as plain values."""
     laws = [
-        {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "inside", "missed")}
+        {name: getattr(law, name) for name in ("name", "gain", "error", "by_chance", "ahead", "inside", "missed")}
         | {"criterion": law.aic_difference, "numbers": {key: number.value for key, number in law.numbers.items()}}
         for law in result.laws
     ]

@@ -9,6 +9,7 @@ from .closed_flights import (
     score_flights as score_flights,
 )
 from .driver_state import DriverState as DriverState
+from .drivers import load_loops as load_loops
 from .flight import Flight as Flight, Snapshot as Snapshot
 from .measuring import measure_frames as measure_frames
 from .plan import Plan as Plan, plan_of as plan_of

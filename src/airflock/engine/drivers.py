@@ -1,9 +1,10 @@
 """Drivers: what flies a plan, compiled or interpreted; interruptions and messages while it compiles."""
 
+import inspect
 import multiprocessing
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache, lru_cache
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 from airflock.engine import interpreted
 from airflock.engine.passes.driver import flight_driver_text
 from airflock.engine.plan import Plan
+from airflock.engine.replace import checked_replace
 from airflock.engine.store import load_driver
 from airflock.support import RuleError, check_interrupted
 
@@ -41,6 +43,36 @@ def flight_driver(plan: Plan) -> ModuleType:
 def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
     """Driver of a plan: compiled, or with device = python its text as plain Python."""
     return interpreted.flight_driver(plan) if device == "python" else flight_driver(plan)
+
+
+LOOPS = """
+import math
+from numba import njit
+from airflock.engine.compiler import CALLED, INNER
+LOOP = dict(error_model="numpy", nogil=True, _nrt=False)
+"""
+
+
+def load_loops(
+    plan: Plan | None,
+    inner: Sequence[Callable[..., Any]],
+    outer: Sequence[Callable[..., Any]],
+    constants: Mapping[str, int | float],
+) -> ModuleType:
+    """Compile loops of a caller around the driver of a plan: the loops are kept with it, and no step is called from
+    Python.
+
+    inner     : plain functions that the loops call, such as an `advance` of their own where there is no plan
+    outer     : plain functions that Python calls; they may call `advance` with the arguments of a `DriverState`
+    constants : numbers that both name
+    """
+    # The driver is compiled as a part of the loops, and not kept by itself: its own lock is theirs.
+    kept, within = "@njit(cache=True, **JIT | CALLED)", "@njit(**ONCE)"
+    parts = ["" if plan is None else checked_replace(flight_text(plan), kept, within, 1), LOOPS]
+    parts += [f"{name} = {value!r}" for name, value in constants.items()]
+    for functions, options in ((inner, "**LOOP, **INNER"), (outer, "cache=True, **LOOP | CALLED")):
+        parts += [f"\n@njit({options})\n{inspect.getsource(function)}" for function in functions]
+    return load_driver("\n".join(parts), "straight_loops" if plan is None else f"{plan.model.name}_loops")
 
 
 def device_of(driver: ModuleType) -> str:

@@ -50,6 +50,7 @@ WITHIN, NEWTON = 1.92, 3  # half of the 95 % point of chi-squared with 1 degree 
 GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit for an a_max
 # The second estimator shares no noise with the first; where set-points run ahead of the vehicle
 # they disagree. A jerk that is limited, as that of ArduCopter, parts them by 0.16: no reason to refuse.
+JUMP = 0.5  # standard deviations of the commands: a smaller change from row to row is no step
 DIFFER, DISAGREE = 0.15, 0.3  # of two estimates of tau: from which on the interval has both, and none is right
 # Relative standard deviation of what the filter leaves out: commands come from the true velocity,
 # so they know more of it than the filter does, also one row after they are given (`_counted_rows`).
@@ -376,10 +377,13 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
         found.refused["delay"] = f"{low:.2g} to {high:.2g} s: the commands change too little; fly velocity steps"
     if math.isinf(high):
         found.refused["tau"] = "depends on delay, which is not identifiable here"
-    elif tau < 2.0 * step:
+    elif tau < 2.0 * step and largest_jump(logs) < JUMP:
         found.refused["tau"] = (
-            f"below about two steps of the log ({2.0 * step:.3g} s): log faster, or fly velocity steps"
+            "the set-points have no steps, and the vehicle runs with them or ahead of them (feed-forward), so its lag "
+            "does not show: fly velocity steps without feed-forward"
         )
+    elif tau < 2.0 * step:
+        found.refused["tau"] = f"below about two steps of the log ({2.0 * step:.3g} s): log faster"
     elif relative > max(DISAGREE, 3.0 * width):
         other = "nothing" if alone else f"{found.second_tau:.2g} s"
         found.refused["tau"] = (
@@ -409,6 +413,13 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
 
 
 MIN_ROWS = 200  # fewest rows for an estimate
+
+
+def largest_jump(logs: FlightLogs) -> float:
+    """Return the largest changes of a command from row to row (99.9 %), in standard deviations of all commands."""
+    jumps = np.linalg.norm(np.diff(logs.command, axis=0)[~logs.is_new[1:]], axis=1)
+    spread = float(np.sqrt(logs.command.var(axis=0).sum()))
+    return float(np.quantile(jumps, 0.999)) / spread if len(jumps) and spread > 0.0 else 0.0
 
 
 def instrumental_tau(logs: FlightLogs, tau: float, a_max: float) -> float:

@@ -13,12 +13,15 @@ from scipy.optimize import lsq_linear, minimize
 
 from airflock.core import PacketParameters
 from airflock.estimate.identification.body_and_sensor import hessian
+from airflock.estimate.identification.vehicle_logs import FlightLogs
 from airflock.parts.radios import links, table
 from airflock.support import RecordingError
 
 TABLE_KEYS: tuple[str, ...] = tuple(f"radio.received_{n}" for n in range(table.ENTRIES))
 COLUMNS = ("receiver", "sender", "t", "stamp")
-NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow")
+# what tables of companion computers call these columns
+ALIASES = {"rx": "receiver", "tx": "sender", "t_rx": "t", "t_tx": "stamp", "rx_time": "t", "tx_time": "stamp"}
+NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow", "seq")
 OLDEST = 60.0  # s; no radio brings packets so late (radio.delay ends at 30 s)
 # half of an interval, relative, beyond which a number is refused. At 20 % one fleet in twenty may
 # be 65 % off and raise the rms from 1.8 to 17 %; at 15 % the worst was 13.8 %.
@@ -86,11 +89,13 @@ def check_packets(heard: pd.DataFrame, where: str = "heard") -> pd.DataFrame:
 
     where : its name in errors; rows are counted as an editor does, the header being the first
     """
+    heard = heard.rename(columns={other: name for other, name in ALIASES.items() if name not in heard})
     lacking = [name for name in COLUMNS if name not in heard]
     if lacking:
         raise RecordingError(
             f"{where}: no column {', '.join(lacking)}; give receiver, sender, t (receiver's clock, s), "
-            "stamp (sender's clock, s), and for reception distance (m) and got (0 or 1, one row per decision and pair)"
+            "stamp (sender's clock, s), and for reception distance (m) and got (0 or 1, one row per decision and "
+            "pair), or seq (the sender's number of each packet, one row per packet that came)"
         )
     numbers = {name: pd.to_numeric(heard[name], errors="coerce") for name in NUMBERS if name in heard}
     came = numbers["got"] > 0 if "got" in numbers else pd.Series(True, heard.index)
@@ -111,6 +116,55 @@ def check_packets(heard: pd.DataFrame, where: str = "heard") -> pd.DataFrame:
             f"{where}: packets are {late.value:.3g} s old when they come; give t and stamp in s: divide them by 1e6 "
             "if they count microseconds, by 1e3 if milliseconds"
         )
+    return found
+
+
+def lost_by_sequence(heard: pd.DataFrame, logs: FlightLogs, comparable: bool) -> tuple[pd.DataFrame, list[str]]:
+    """Return a row with got and distance for each packet that was sent, from those that came; and notes.
+
+    heard      : one row per packet that came, with seq, which counts the packets of each sender
+    comparable : the logs are on one clock, to which stamps are put by the ages of packets
+
+    Packets count as sent on the fast link. Losses are gaps of seq between two packets that came; the stamp of a lost
+    one lies between theirs. Distances are those of the two logs at that time; rows outside of either are left out.
+    """
+    if not comparable:
+        return heard, ["no losses from seq: the clocks of the logs are not known to agree (--same-clock)"]
+    ahead = fit_delay(heard).ahead
+    number = {name: k for k, name in enumerate(logs.names)}
+    parts: list[pd.DataFrame] = []
+    again = 0
+    for (receiver, sender), own in heard.groupby(["receiver", "sender"]):
+        if str(receiver) not in number or str(sender) not in number:
+            continue
+        own = own.sort_values("t").drop_duplicates("seq")
+        # A counter that wraps around or starts again would look like thousands of losses.
+        run = (own["seq"].diff() < 0).cumsum()
+        again += int(run.max())
+        for _, part in own.groupby(run):
+            came = part["seq"].to_numpy(np.int64)
+            sent = np.arange(came[0], came[-1] + 1)
+            stamp = np.interp(sent, came, part["stamp"].to_numpy(float)) - ahead.get(str(sender), 0.0)
+            parts.append(pd.DataFrame({
+                "receiver": receiver, "sender": sender, "got": np.isin(sent, came).astype(float),
+                "fast": 1.0, "slow": 0.0, "distance": _apart(logs, number[str(receiver)], number[str(sender)], stamp),
+            }))  # fmt: skip
+    if not parts:
+        return heard, ["no losses from seq: receiver and sender are no names of the logs: " + ", ".join(logs.names)]
+    found = pd.concat(parts, ignore_index=True)
+    found = found[np.isfinite(found["distance"])]
+    notes = [f"losses from gaps of seq ({1.0 - found['got'].mean():.1%} of {len(found)}), distances from the positions"]
+    return found, notes + [f"seq starts again {again} times; nothing counts as lost there"] * (again > 0)
+
+
+def _apart(logs: FlightLogs, one: int, other: int, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return distances (m) of two drones at times; nan outside of the log of either."""
+    places = []
+    for rows in (logs.of(one), logs.of(other)):
+        own = logs.time[rows]
+        columns = logs.position[rows].T
+        places.append(np.array([np.interp(time, own, column, np.nan, np.nan) for column in columns]))
+    found: NDArray[np.float64] = np.linalg.norm(places[0] - places[1], axis=0)
     return found
 
 
@@ -165,6 +219,12 @@ def fit_delay(heard: pd.DataFrame) -> DelayFit:
     delay = float(found[n])
     ahead = {str(name): float(offset) for name, offset in zip(names, found[:n], strict=True)}
     return DelayFit(delay, (delay - wide, delay + wide), "", scatter, ahead)
+
+
+def clocks_apart(late: DelayFit) -> float:
+    """Return how far the clocks of the drones are apart, s; 0 if no farther than packets scatter."""
+    apart = max(late.ahead.values(), default=0.0) - min(late.ahead.values(), default=0.0)
+    return apart if not late.reason and apart > max(late.scatter, late.interval[1] - late.interval[0]) else 0.0
 
 
 def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:

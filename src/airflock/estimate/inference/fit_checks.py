@@ -14,7 +14,7 @@ from airflock.estimate.inference.observed_tracks import (
     ENTERS,
     UNSEEN,
 )
-from airflock.estimate.inference.parametric_bootstrap import FitNoise, fly_span
+from airflock.estimate.inference.parametric_bootstrap import FitNoise, fly_freely
 
 Array = NDArray[np.float64]
 SHELLS = (0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)  # nearest distances
@@ -206,6 +206,7 @@ def _of_length_one(vectors: Array) -> Array:
 
 LONGEST = 60.0  # s that are flown
 MARGIN = 0.01  # share of a value that nobody calls a difference
+TINY = 1e-9
 MEANINGS = {
     "polarisation": "1", "milling": "1", "speed": "m/s", "nearest": "m", "radius": "m",
 }  # fmt: skip
@@ -213,7 +214,7 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class PredictiveCheck:
-    """Check by measure: the tracks' mean and the 2.5 and 97.5 % ends of the flights, 1 % of the mean wider."""
+    """Check by measure: the tracks' mean, and the ends that hold a flight of the law in 95 %, all measures together."""
 
     found: dict[str, tuple[float, float, float]]
 
@@ -270,12 +271,28 @@ def run_predictive_check(
     state = np.full((frames, tracks.individual_count), COUNTED, np.int8)
     for number in range(1_000_000, 1_000_000 + flights):
         generator = np.random.default_rng(number)
-        flown = fly_span(walk, model.split(point), noise, state, kept[begin : begin + 1], number, generator)[::stride]
+        flown = fly_freely(walk, model.split(point), noise, state, kept[begin : begin + 1], number, generator)[::stride]
         rows.append(flock_measures(flown, np.broadcast_to(there[begin], (len(flown), flown.shape[2])), tracks.nearest))
         on_progress()
-    found = {}
-    for name, value in own.items():
-        drawn = np.array([row[name] for row in rows])
-        margin = MARGIN * abs(value)
-        found[name] = (value, float(np.quantile(drawn, 0.025)) - margin, float(np.quantile(drawn, 0.975)) + margin)
-    return PredictiveCheck(found)
+    values = {name: np.array([row[name] for row in rows]) for name in own}
+    return PredictiveCheck({name: (value, *prediction_ends(name, values[name])) for name, value in own.items()})
+
+
+def prediction_ends(name: str, drawn: Array) -> tuple[float, float]:
+    """Return the ends between which one more flight lies, jointly for all measures in 95 %, from flights.
+
+    By Student's distribution, of logarithms, or of logits where a measure ends at 1. The extremes of 20 flights hold
+    another one in 90 % alone: of five measures of the law itself one lay outside every third time.
+    """
+    from scipy.stats import t as student
+
+    bounded = MEANINGS[name] == "1"
+    y = np.clip(drawn, TINY, 1.0 - TINY if bounded else np.inf)
+    y = np.log(y / (1.0 - y)) if bounded else np.log(y)
+    level = 0.5 + 0.5 * 0.95 ** (1.0 / len(MEANINGS))
+    half = student.ppf(level, max(len(y) - 1, 1)) * y.std(ddof=1) * math.sqrt(1.0 + 1.0 / len(y)) if len(y) > 1 else 0.0
+    low, high = np.exp(y.mean() - half), np.exp(y.mean() + half)
+    if bounded:
+        low, high = low / (1.0 + low), high / (1.0 + high)
+    margin = MARGIN * float(drawn.mean())
+    return float(low) - margin, float(high) + margin

@@ -1,7 +1,7 @@
 """Score a law on tracks: a Kalman filter in innovation form, and the likelihood of what it does not predict."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine import Plan, load_loops
 from airflock.estimate.inference.law_candidates import FitParameter, LawCandidate
 from airflock.estimate.inference.observed_tracks import (
     ABSENT,
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 # so the noise of the tracks and that of the motion need not be known: the state is never one noisy
 # frame, and never contains the future.
 AWAY = 1e9  # m; beyond every range
+SCORED = COUNTED  # by the name that loops use; the text of a driver has a COUNTED of its own
 GAPS = 12  # frames unseen, beyond which gains grow no more
 
 
@@ -107,8 +109,8 @@ def correct_state(rows, k, i, axes, half, seen, gains, gap, e, out, counted):  #
         rows[axes + a, i] += gains[0, 1, gap] * ahead + gains[1, 1, gap] * (e[a] - ahead)
 
 
-def fly_straight(first, last, half, rows, axes, usual, period):  # type: ignore[no-untyped-def]
-    """Move everybody straight on for a period at the usual speed; a driver for those whom no law moves."""
+def advance(first, last, half, rows, axes, usual, period):  # type: ignore[no-untyped-def]
+    """Move everybody straight on for a period at the usual speed: the driver of those whom no law moves."""
     for i in range(rows.shape[1] if last > first else 0):
         size = 1e-30
         for a in range(axes):
@@ -118,115 +120,121 @@ def fly_straight(first, last, half, rows, axes, usual, period):  # type: ignore[
             rows[a, i] += rows[axes + a, i] * period
 
 
-@cache
-def compiled_loops() -> tuple[Any, Any, Any]:
-    """Compile the driver of straight motion, and the loops over the frames of a span: filtered, and flown freely.
+def begin_span(rest, rows, before, start):  # type: ignore[no-untyped-def]
+    """Start the driver with the present individuals: past states that arrive late are filled with their states."""
+    for a in range(before.shape[0]):
+        for i in range(before.shape[1]):
+            start[a, i] = before[a, i]
+    advance(0, 0, 0, *rest)
+    for a in range(before.shape[0]):
+        for i in range(before.shape[1]):
+            rows[a, i] = before[a, i]
 
-    The driver of the law comes as an argument: a call from Python for each frame took longer than the law itself.
-    """
-    from numba import njit
 
-    options = {"error_model": "numpy", "nogil": True}
-    speed_, right_ = njit(**options)(apply_own_speed), njit(**options)(correct_state)
-
-    @njit(**options)
-    def begin(advance, rest, rows, before, start):  # type: ignore[no-untyped-def]
-        start[:] = before
-        advance(0, 0, 0, *rest)
-        rows[:, : before.shape[1]] = before
-
-    @njit(**options)
-    def filtered(  # type: ignore[no-untyped-def]
-        advance, rest, steps, rows, before, start, seen, state, speed, gains, out, kept, pushes, axes, half, pace, usual,
-        keep,
-    ):  # fmt: skip
-        e, unseen = np.zeros(3), np.zeros(state.shape[1], np.int64)
-        for k in range(state.shape[0]):
-            if k > 0:
-                advance((k - 1) * steps, k * steps, 0, *rest)
-                if pushes.shape[0] > 0:
-                    for i in range(state.shape[1]):
-                        size = 0.0
-                        for a in range(axes):
-                            size += before[axes + a, i] ** 2
-                        scale = math.sqrt(size) / pace if pace > 0.0 else 1.0
-                        for a in range(axes):
-                            pushes[k - 1, a, i] = rows[axes + a, i] * scale - before[axes + a, i]
-            # One individual after another; those who enter take the observed state, and absent ones
-            # wait beyond every range, each at a place of its own, so that no law meets them or
-            # divides by zero.
-            for i in range(state.shape[1]):
-                what = state[k, i]
-                if what in (ABSENT, ENTERS):
-                    for a in range(axes):
-                        rows[a, i] = seen[k, a, i] if what == ENTERS else AWAY * (2.0 + i)
-                        rows[axes + a, i] = speed[k, a, i] if what == ENTERS else 1.0
-                    unseen[i] = 0
+def filter_span(  # type: ignore[no-untyped-def]
+    rest, steps, rows, before, start, unseen, e, seen, state, speed, gains, out, kept, pushes, axes, half, pace, usual,
+    keep,
+):  # fmt: skip
+    """Predict each frame of a span from the corrected states of the one before, and compare."""
+    for k in range(state.shape[0]):
+        if k > 0:
+            advance((k - 1) * steps, k * steps, 0, *rest)
+            for i in range(state.shape[1] if pushes.shape[0] > 0 else 0):
+                size = 0.0
+                for a in range(axes):
+                    size += before[axes + a, i] ** 2
+                scale = math.sqrt(size) / pace if pace > 0.0 else 1.0
+                for a in range(axes):
+                    pushes[k - 1, a, i] = rows[axes + a, i] * scale - before[axes + a, i]
+        # One individual after another; those who enter take the observed state, and absent ones
+        # wait beyond every range, each at a place of its own, so that no law meets them or divides
+        # by zero.
+        for i in range(state.shape[1]):
+            what = state[k, i]
+            if what in (ABSENT, ENTERS):
+                for a in range(axes):
+                    rows[a, i] = seen[k, a, i] if what == ENTERS else AWAY * (2.0 + i)
+                    rows[axes + a, i] = speed[k, a, i] if what == ENTERS else 1.0
+                unseen[i] = 0
+            else:
+                # Before the correction: the step that is scaled is the predicted one.
+                if pace > 0.0:
+                    apply_own_speed(rows, before, i, axes, half, pace, usual, keep)
+                if what == UNSEEN:
+                    unseen[i] += 1
                 else:
-                    # Before the correction: the step that is scaled is the predicted one.
-                    if pace > 0.0:
-                        speed_(rows, before, i, axes, half, pace, usual, keep)
-                    if what == UNSEEN:
-                        unseen[i] += 1
-                    else:
-                        gap = min(unseen[i], gains.shape[2] - 1)
-                        right_(rows, k, i, axes, half, seen, gains, gap, e, out, what == COUNTED)
-                        unseen[i] = 0
-                for a in range(2 * axes):
-                    before[a, i] = rows[a, i]
-                    if kept.shape[0] > 0:
-                        kept[k, a, i] = rows[a, i]
-            # Delayed or averaged percepts need states before the first frame; the first observed
-            # ones stand for them.
-            if k == 0:
-                begin(advance, rest, rows, before, start)
+                    gap = unseen[i] if unseen[i] < gains.shape[2] else gains.shape[2] - 1
+                    correct_state(rows, k, i, axes, half, seen, gains, gap, e, out, what == SCORED)
+                    unseen[i] = 0
+            for a in range(2 * axes):
+                before[a, i] = rows[a, i]
+                if kept.shape[0] > 0:
+                    kept[k, a, i] = rows[a, i]
+        # Delayed or averaged percepts need states before the first frame; the first observed ones
+        # stand for them.
+        if k == 0:
+            begin_span(rest, rows, before, start)
 
-    @njit(**options)
-    def flown(  # type: ignore[no-untyped-def]
-        advance, rest, steps, rows, before, start, state, follow, generator, pushed, blurred, lasts, wander, axes, half,
-        usual, keep, out,
-    ):  # fmt: skip
-        error = np.zeros((axes, state.shape[1]))
+
+def stretch_step(rows, before, i, axes, half, usual, keep, change):  # type: ignore[no-untyped-def]
+    """Stretch the last step of individual i of a law of headings: its speed relaxes to the usual one, and wanders."""
+    size = 0.0
+    for a in range(axes):
+        size += before[axes + a, i] ** 2
+    own = usual + keep * (math.sqrt(size) - usual) + change
+    own = (own if own > 0.05 * usual else 0.05 * usual) / usual
+    for a in range(axes):
+        step = rows[a, i] - before[a, i]
+        if half[a] > 0.0:
+            step -= 2.0 * half[a] * round(step / (2.0 * half[a]))
+        rows[a, i] = before[a, i] + own * step
+        rows[axes + a, i] *= own
+
+
+def fly_span(  # type: ignore[no-untyped-def]
+    rest, steps, rows, before, start, state, follow, draws, error, pushed, blurred, lasts, wander, axes, half, usual,
+    keep, out,
+):  # fmt: skip
+    """Fly freely through the frames of a span from the states of its first frame."""
+    for k in range(state.shape[0]):
+        stay, fresh = (lasts, math.sqrt(1.0 - lasts * lasts)) if k > 0 else (0.0, 1.0)
+        # Noise that is no number of the law: pushes of the velocity, or errors of the position by
+        # which everybody decides and from which nobody moves.
         for a in range(axes):
             for i in range(state.shape[1]):
-                error[a, i] = blurred * generator.normal(0.0, 1.0)
-        for k in range(state.shape[0]):
-            # Noise that is no number of the law: pushes of the velocity, or errors of the position by
-            # which everybody decides and from which nobody moves.
-            for i in range(state.shape[1] if k > 0 else 0):
-                for a in range(axes):
-                    before[a, i], before[axes + a, i] = rows[a, i], rows[axes + a, i]
-                    rows[axes + a, i] += pushed * generator.normal(0.0, 1.0)
-                    error[a, i] = lasts * error[a, i]
-                    error[a, i] += math.sqrt(1.0 - lasts**2) * blurred * generator.normal(0.0, 1.0)
-                    rows[a, i] += error[a, i]
+                error[a, i] = stay * error[a, i] + fresh * blurred * draws[k, a, i]
+                before[a, i], before[axes + a, i] = rows[a, i], rows[axes + a, i]
+                rows[axes + a, i] += pushed * draws[k, axes + a, i]
+                rows[a, i] += error[a, i]
+        if k > 0:
+            advance((k - 1) * steps, k * steps, 0, *rest)
+        for i in range(state.shape[1]):
             if k > 0:
-                advance((k - 1) * steps, k * steps, 0, *rest)
+                for a in range(axes):
+                    rows[a, i] -= error[a, i]
+                if wander >= 0.0:
+                    stretch_step(rows, before, i, axes, half, usual, keep, wander * draws[k, 2 * axes, i])
+            # Who enters or is absent follows the record, so that flights have the gaps of the tracks.
+            if k == 0 or state[k, i] in (ABSENT, ENTERS):
+                for a in range(2 * axes):
+                    rows[a, i] = follow[k, a, i]
+                    before[a, i] = rows[a, i]
+        if k == 0:
+            begin_span(rest, rows, before, start)
+        for a in range(2 * axes):
             for i in range(state.shape[1]):
-                if k > 0:
-                    size = 0.0
-                    for a in range(axes):
-                        rows[a, i] -= error[a, i]
-                        size += before[axes + a, i] ** 2
-                    if wander >= 0.0:  # a law of headings: own speeds relax to the usual one, and wander
-                        own = usual + keep * (math.sqrt(size) - usual) + wander * generator.normal(0.0, 1.0)
-                        own = max(own, 0.05 * usual)
-                        for a in range(axes):
-                            step = rows[a, i] - before[a, i]
-                            if half[a] > 0.0:
-                                step -= 2.0 * half[a] * round(step / (2.0 * half[a]))
-                            rows[a, i] = before[a, i] + own / usual * step
-                            rows[axes + a, i] *= own / usual
-                # Who enters or is absent follows the record, so that flights have the gaps of the tracks.
-                if k == 0 or state[k, i] == ABSENT or state[k, i] == ENTERS:
-                    for a in range(2 * axes):
-                        rows[a, i] = follow[k, a, i]
-            if k == 0:
-                before[:] = rows[:, : before.shape[1]]
-                begin(advance, rest, rows, before, start)
-            out[k] = rows[:, : before.shape[1]]
+                out[k, a, i] = rows[a, i]
 
-    return njit(**options)(fly_straight), filtered, flown
+
+@cache
+def span_loops(plan: Plan | None) -> Any:
+    """Return the compiled loops over the frames of a span around the driver of a law, or around straight motion.
+
+    A call from Python for each frame took as long as the law itself.
+    """
+    inner: list[Callable[..., Any]] = [apply_own_speed, correct_state, begin_span, stretch_step]
+    names = {"ABSENT": ABSENT, "UNSEEN": UNSEEN, "SCORED": SCORED, "ENTERS": ENTERS, "AWAY": AWAY}
+    return load_loops(plan, [*([] if plan else [advance]), *inner], [filter_span, fly_span], names)
 
 
 # A smoother of both sides contains the future, one of the past lags and flattens slopes. The step
@@ -243,6 +251,8 @@ class InnovationFilter:
         n = tracks.individual_count
         self.out = np.zeros((len(self.seen), tracks.axes, n))
         self.previous_states, self.start = np.zeros((2 * tracks.axes, n)), np.zeros((2 * tracks.axes, n))
+        self.unseen, self.scratch = np.zeros(n, np.int64), np.zeros(3)
+        self.loops = span_loops(None if law is None else law.plan)
         self.half_sides = np.array([*tracks.box[: tracks.axes], *[0.0] * (3 - tracks.axes)])
         self.rows, self.steps = np.zeros((2 * tracks.axes, n)), 1
         if law is not None:
@@ -278,24 +288,26 @@ class InnovationFilter:
         for number in range(len(tracks.spans)) if spans is None else spans:
             part = slice(*tracks.spans[number])
             self.out[part] = 0.0
-            compiled_loops()[1](
-                *self.begin(numbers, mean_speed), self.seen[part], tracks.state[part], tracks.speed[part], table,
+            self.unseen[:] = 0
+            self.loops.filter_span(
+                *self.begin(numbers, mean_speed), self.unseen, self.scratch, self.seen[part], tracks.state[part],
+                tracks.speed[part], table,
                 self.out[part], none if kept_states is None else kept_states[part],
                 none if pushes is None else pushes[part], self.axes, self.half_sides, pace, mean_speed, gains.keep,
             )  # fmt: skip
         return self.out
 
     def begin(self, numbers: dict[int, float], mean_speed: float, world: int = 0) -> tuple[Any, ...]:
-        """Forget the span before; return the driver and its memory. world : number of the random world of the law."""
+        """Forget the span before; return the driver's memory. world : number of the random world of the law."""
         memory = self.rows, self.previous_states, self.start
         if self.law is None:
-            return compiled_loops()[0], (self.rows, self.axes, mean_speed, self.tracks.period), 1, *memory
+            return (self.rows, self.axes, mean_speed, self.tracks.period), 1, *memory
         self.flight.buffer[:] = self.fresh
         self.flight.set_integer("world", world)
         row = self.flight.arrays["row"]
         for column, value in numbers.items():
             row[column] = value
-        return self.flight.driver.advance, self.flight.arguments(0, 0)[3:], self.steps, *memory
+        return self.flight.arguments(0, 0)[3:], self.steps, *memory
 
 
 # The likelihood: surprise at the next frames under a law with its numbers and the gains of the
@@ -311,7 +323,7 @@ _DENSITY, _WITHIN = math.exp(-0.5 * SOFT**2) / math.sqrt(2.0 * math.pi), math.er
 SAME = (_WITHIN + 2.0 * SOFT * _DENSITY - SOFT**2 * (1.0 - _WITHIN)) ** -0.5
 AS_NORMAL = _WITHIN  # mean of min(z², SOFT |z|) of normal numbers
 FIRST_GAINS = (0.6, 0.3, 0.6, 0.3, 0.9)
-SMALL = 360  # frames on which is searched
+SMALL = (7_000, 150, 360)  # individual steps on which is searched; least and largest number of frames
 KP = FitParameter("gain", -1, "1", 0.01, 0.999, False, 0.6)
 KV = FitParameter("gain", -1, "1", 3e-4, 1.3, True, 0.3)
 KEEP = FitParameter("keep", -1, "1", 0.0, 1.0, False, 0.9)
@@ -411,6 +423,7 @@ class FitModel:
         self.spans = [(t, s) for t, each in enumerate(self.tracks) for s in range(len(each.spans))]
         self.held: frozenset[int] = frozenset()
         self.soft = False
+        self.pool: Sequence[int] = range(len(self.spans))
 
     def with_fixed(self, numbers: Sequence[int]) -> "FitModel":
         """Return the model with some numbers fixed at their defaults, whatever the point says."""
@@ -418,10 +431,16 @@ class FitModel:
         twin.held = frozenset({*self.held, *numbers})
         return twin
 
+    def on(self, pool: Sequence[int]) -> "FitModel":
+        """Return the model that sees these spans alone when it is fitted."""
+        twin = copy(self)
+        twin.pool = pool
+        return twin
+
     def with_parameters(self, numbers: Sequence[FitParameter]) -> "FitModel":
         """Return the law on these tracks with only these numbers fitted."""
         assert self.law is not None
-        found = FitModel(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale)
+        found = FitModel(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale).on(self.pool)
         return found.robust() if self.soft else found
 
     def with_parameter(self, law: LawCandidate, parameter: FitParameter) -> tuple["FitModel", int]:
@@ -497,10 +516,13 @@ class FitModel:
         across = np.bincount(owner, squares[:, 1:].sum(axis=1), m).astype(float)
         return SpanScore(np.bincount(owner, minlength=m).astype(float), along, across, self.axes)
 
-    def few(self, frames: int = SMALL) -> list[int]:
-        """Return spans, evenly over all tracks, with about so many frames."""
-        lengths = [self.tracks[t].spans[s][1] - self.tracks[t].spans[s][0] for t, s in self.spans]
-        count = int(np.clip(round(frames / np.mean(lengths)), 3, len(self.spans)))
-        if count > 0.7 * len(self.spans):
-            return list(range(len(self.spans)))
-        return sorted({int(k) for k in np.linspace(0, len(self.spans) - 1, count + 2)[1:-1].round()})
+    def few(self, frames: int = 0) -> list[int]:
+        """Return spans of the pool, evenly over all tracks, with about so many frames; 0 : enough for a search."""
+        pool = list(self.pool)
+        individuals = max(tracks.individual_count for tracks in self.tracks)
+        frames = frames or int(np.clip(SMALL[0] / individuals, *SMALL[1:]))
+        lengths = [self.tracks[t].spans[s][1] - self.tracks[t].spans[s][0] for t, s in (self.spans[k] for k in pool)]
+        count = int(np.clip(round(frames / np.mean(lengths)), min(2, len(pool)), len(pool)))
+        if count > 0.7 * len(pool):
+            return pool
+        return sorted({pool[int(k)] for k in np.linspace(0, len(pool) - 1, count + 2)[1:-1].round()})

@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ STEP = 0.025  # s; longest motion step
 LONG = 1e5  # s; a flight that outlasts any span
 DECADES = 100.0  # a number whose unit says nothing of its size is sought this far from its default
 RATES = (0.01, 20.0)  # 1/s, of gains
+METRIC, OFFERED = "metric", ("metric", "nearest", "voronoi")  # neighbourhoods: by distance, and those on offer
+MOST_NEIGHBOURS = 20
 QUIET = {"sensors.kind": "perfect", "wind.gust": 0.0, "radio.loss": 0.0}
 
 
@@ -29,6 +32,7 @@ class FitParameter:
     """A number of a law or its body: its column, its range, and the scale on which it is searched.
 
     key : section and name; column : in a driver's row; unit; low, high : range that is sought; log : by its logarithm
+    whole : only whole numbers below `high` are sought
     """
 
     key: str
@@ -38,16 +42,18 @@ class FitParameter:
     high: float
     log: bool
     default: float
+    whole: bool = False
 
     def value(self, u: float) -> float:
         """Return the number at a place from 0 to 1 in its range."""
         if self.log:
-            return float(self.low * (self.high / self.low) ** u)
+            value = float(self.low * (self.high / self.low) ** u)
+            return min(math.floor(value), self.high - 1.0) if self.whole else value
         return float(self.low + (self.high - self.low) * u)
 
     def place(self, value: float) -> float:
         """Return the place from 0 to 1 of a number in its range."""
-        inside = min(max(value, self.low), self.high)
+        inside = min(max(value + 0.5 * self.whole, self.low), self.high)
         if self.log:
             return math.log(inside / self.low) / math.log(self.high / self.low)
         return (inside - self.low) / (self.high - self.low)
@@ -112,18 +118,26 @@ def make_candidate(base: Scenario, scale: TrackScale, axes: int) -> LawCandidate
 
 
 def law_scenarios(
-    models: Iterable[str | Scenario], settings: Mapping[str, Any], *, trust: bool = False
+    models: Iterable[str | Scenario],
+    settings: Mapping[str, Any],
+    topologies: Iterable[str] = (METRIC,),
+    *,
+    trust: bool = False,
 ) -> tuple[list[Scenario], tuple[float, ...]]:
     """Return scenarios of the laws, and half sides (m) of the periodic box common to all; 0 along an open axis.
 
     models : names of laws, presets, scenario files, files with a law, or Scenarios
+    topologies : kinds of neighbourhoods by which each is tried; metric : by distance, as the law itself has it
     Raises ScenarioError with every error.
     """
     errors: list[tuple[str, str]] = []
     found = []
-    for what in models:
+    unknown = [kind for kind in topologies if kind not in OFFERED]
+    if unknown:
+        raise ScenarioError([f"--topologies {', '.join(unknown)}: choose from {', '.join(OFFERED)}"])
+    for what, kind in product(models, topologies):
         try:
-            found.append(_base(what, settings, trust))
+            found.append(_by_topology(what, settings, kind, trust))
         except AirflockError as error:
             errors += [(f"{what}: ", line) for line in str(error).splitlines()]
     if errors:  # what is wrong with a setting is so for all laws: it is said once
@@ -137,6 +151,18 @@ def law_scenarios(
                 [f"{each.name}: its box is not that of {found[0].name}; set one for all: --set world.edges=open"]
             )
     return found, boxes[0]
+
+
+def _by_topology(what: str | Scenario, settings: Mapping[str, Any], kind: str, trust: bool) -> Scenario:
+    """Load the scenario of a law with a kind of neighbourhood, which its name says."""
+    if kind == METRIC:
+        return _base(what, settings, trust)
+    chosen = {**settings, "topology.kind": kind}
+    if isinstance(what, Scenario):
+        made = build_scenario(what.document, what.name, chosen, caller_parts=CallerParts(law=what.model))
+    else:
+        made = _base(what, chosen, trust)
+    return replace(made, name=f"{made.name}, {kind}")
 
 
 def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Scenario:
@@ -202,6 +228,10 @@ def _numbers(scenario: Scenario, plan: Plan, scale: TrackScale) -> tuple[FitPara
                 found.append(
                     FitParameter(key, first + names.index(name), declared.unit, low, high, log, float(default))
                 )
+    if scenario.topology.numbers.kind == "nearest":
+        column = _first(plan, "topology") + plan.records["topology"].index("k")
+        k = float(scenario.topology.numbers.k)
+        found.append(FitParameter("topology.k", column, "1", 1.0, MOST_NEIGHBOURS + 1.0, True, k, whole=True))
     return tuple(found)
 
 
@@ -241,16 +271,15 @@ def _noises(scenario: Scenario, plan: Plan, numbers: tuple[FitParameter, ...]) -
             generator.normal(size=(plan.dimensions, agents)),
         ]
     )
-    rows = DriverState.of(plan, flown, start=start).tables.row
+    rows = DriverState.of(plan, flown, start=start, device="python").tables.row
 
     def differ(changed: Mapping[int, float]) -> bool:
         commands: list[NDArray[Any]] = []
         for world in (0, 1):
-            state = DriverState.of(plan, flown, world=world, start=start)
+            state = DriverState.of(plan, flown, world=world, start=start, device="python")
             state.arrays["row"][:] = rows
             for column, value in changed.items():
                 state.arrays["row"][column] = value
-            state.compile()
             state.advance(0, 1, 2)
             commands.append(state.rows([f"c{axis}" for axis in plan.axes]))
         return not np.array_equal(commands[0], commands[1], equal_nan=True)

@@ -15,16 +15,18 @@ from airflock.estimate.inference import law_selection
 from airflock.estimate.inference.fit_checks import PredictiveCheck, lack_of_fit, run_predictive_check
 from airflock.estimate.inference.innovation_filter import FitModel
 from airflock.estimate.inference.law_candidates import (
+    METRIC,
     FitParameter as Sought,
     LawCandidate,
     law_scenarios,
     make_candidate,
 )
-from airflock.estimate.inference.likelihood_fit import Fit
+from airflock.estimate.inference.likelihood_fit import Fit, with_coordinate
 from airflock.estimate.inference.observed_tracks import (
     ABSENT,
     SpanTracks,
     TrackScale,
+    shifted_in_time,
     tracks_from_recording,
     tracks_scale,
 )
@@ -32,6 +34,7 @@ from airflock.estimate.inference.parametric_bootstrap import CorrectedFit, FitNo
 from airflock.recordings import load_recording, load_tracks
 from airflock.scenarios import CallerParts, Scenario, build_scenario
 from airflock.support import AirflockError, RecordingError, expand_path
+from airflock.world import half_sizes
 
 Array = NDArray[np.float64]
 LAG = 0.3  # s; half of the window over which an acceleration is taken
@@ -143,6 +146,7 @@ class LawResult:
     inside      : share of held-out differences within the 95 % that are predicted
     missed      : share of what is explained with a free answer to neighbours beside the law that it leaves over, 0 to 1
     numbers     : fitted; with intervals for the best law alone
+    by_chance   : of the best law, gain and error where individuals are shifted in time
     """
 
     name: str
@@ -156,8 +160,9 @@ class LawResult:
     numbers: dict[str, ParameterEstimate]
     candidate: LawCandidate
     fit: Fit
-    maps: ForceMaps
+    maps: ForceMaps | None
     negative_log_likelihoods: Array
+    by_chance: tuple[float, float] | None = None
 
 
 @dataclass
@@ -189,18 +194,20 @@ class InferResult:
         found: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in scenario.document.items()}
         found.pop("published", None)
         found["title"] = f"{self.best.name}, inferred from tracks of {self.individual_count} individuals"
-        found |= {"agents": self.individual_count, "duration": 120.0, "dt": scenario.flight.dt}
+        length = _short(max(self.scale.length, scenario.flight.dt))
+        found |= {"agents": self.individual_count, "duration": length, "dt": scenario.flight.dt}
         for key, value in self.settings.items():
             section, _, name = key.partition(".")
             entry: dict[str, Any] = {"value": _short(value), "source": self.sources[key]}
             found.setdefault(section, {})[name] = entry
-        if "arena" not in found.get("world", {}) or found["world"]["arena"] == "none":
-            found["start"] = {
-                "kind": "ball", "radius": _short(max(0.5 * self.scale.far, 1e-3)), "speed": _short(self.scale.speed),
-                "separation": 0.0,
-            }  # fmt: skip
+        # Flocks start as wide as the tracks do: a shoal that begins five times as wide never meets.
+        begin = {"speed": _short(self.scale.speed), "separation": 0.0}
+        room = math.inf if scenario.world.arena == "none" else min(half_sizes(scenario.world)[:2])
+        periodic = scenario.world.edges == "periodic"
+        if not periodic and self.scale.begin < 0.7 * room:
+            found["start"] = {"kind": "ball", "radius": _short(max(self.scale.begin, 1e-6)), **begin}
         else:
-            found["start"] = {"kind": "arena", "speed": _short(self.scale.speed), "separation": 0.0}
+            found["start"] = {"kind": "arena", **begin}
         return found
 
     def scenario(self) -> Scenario:
@@ -275,6 +282,9 @@ def set_parameters(result: InferResult, model: FitModel, corrected: CorrectedFit
         numbers[n.key] = ParameterEstimate(
             n.key, n.value(corrected.place[k]), ends[0], ends[1], n.unit, ends[2], ends[3]
         )
+    for k, n in enumerate(model.numbers[: model.named]):
+        if n.whole:  # no slope leads from one whole number to the next: those that explain the tracks as well
+            numbers[n.key] = _whole_estimate(model, k, result.best.fit)
     noise = corrected.noise
     known = {n.column: (n.key, n.unit) for n in result.best.candidate.noise_parameters}
     if result.best.candidate.body_noise_column >= 0:
@@ -287,6 +297,19 @@ def set_parameters(result: InferResult, model: FitModel, corrected: CorrectedFit
     today = datetime.date.today().isoformat()
     result.settings = {key: number.value for key, number in numbers.items()}
     result.sources = {key: f"infer, {today}: {interval_text(number)}" for key, number in numbers.items()}
+
+
+def _whole_estimate(model: FitModel, index: int, fit: Fit) -> ParameterEstimate:
+    """Return a whole number with the first and last that explain the tracks as well, the others as they are fitted."""
+    from scipy.stats import chi2
+
+    n, spans = model.numbers[index], law_selection.sample_spans(model)
+    values = np.arange(int(n.low), int(n.high))
+    at = [with_coordinate(fit.place, index, n.place(float(value))) for value in values]
+    losses = np.array([model.score(u, spans).loss() for u in at])
+    ends = [values[losses < losses.min() + chi2.ppf(0.95, free) / 2.0][[0, -1]] for free in (1, model.named)]
+    (low, high), (least, most) = (tuple(map(float, each)) for each in ends)
+    return ParameterEstimate(n.key, float(values[losses.argmin()]), low, high, n.unit, least, most)
 
 
 def _low(number: Sought, place: float) -> float | None:
@@ -323,7 +346,7 @@ def _short(value: float) -> float:
 
 # One set of points ended in the wrong mode (238 units below a climb from the truth); of three
 # others two found the right one.
-RACES = 3  # from new points, of a law that is searched deeper
+RACES = 2  # from new points, of a law that is searched deeper
 LAWS = ("couzin_2002", "reynolds_1987", "vicsek_1995", "vasarhelyi_2018")
 
 
@@ -332,6 +355,7 @@ def infer(
     models: Sequence[str | Scenario] = LAWS,
     *,
     settings: Mapping[str, Any] | None = None,
+    topologies: Sequence[str] = (METRIC,),
     check: int = 20,
     seed: int = 0,
     trust: bool = False,
@@ -347,6 +371,9 @@ def infer(
         Laws by name, presets, scenario files or files with a law of your own.
     settings : mapping, optional
         Keys that hold for every candidate, such as {"world.arena": "square", "world.side": 40.0}.
+    topologies : sequence of str
+        Neighbourhoods by which every law is tried: metric, as the law itself has it; nearest, the k nearest, k fitted;
+        voronoi, whose cells border its own.
     check : int
         Flights of the law found that are compared with the tracks; 0: none.
     seed : int
@@ -376,9 +403,10 @@ def infer(
     >>> found.verdict  # doctest: +SKIP
     'couzin_2002 explains the tracks best'
     """
-    result, comparison, model = name_law(tracks, models, settings, seed=seed, trust=trust, done=done)
-    if result.best is not None and model is not None:
+    result, comparison = name_law(tracks, models, settings, topologies, seed=seed, trust=trust, done=done)
+    if result.best is not None:
         best, say = result.best, done or (lambda _: None)
+        model = comparison.simplify(best)
         teller = _teller(say, f"{best.name}, flown again")
         corrected = correct_fit(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
         set_parameters(result, model, corrected)
@@ -391,111 +419,156 @@ def name_law(
     tracks: Any,
     models: Sequence[str | Scenario],
     settings: Mapping[str, Any] | None = None,
+    topologies: Sequence[str] = (METRIC,),
     *,
     seed: int = 0,
     trust: bool = False,
     done: Callable[[str], None] | None = None,
-) -> tuple[InferResult, "_Comparison", FitModel | None]:
-    """Return the result of `infer` before its intervals and flights, the comparison, and the model of the best law."""
+) -> tuple[InferResult, "_Comparison"]:
+    """Return the result of `infer` before its intervals and flights, and the comparison of the laws."""
     models = [models] if isinstance(models, str) else models
     if not isinstance(models, Iterable):
         raise AirflockError(f"infer: models = {models!r}: give a list of laws, such as ['couzin_2002']")
     if not models:
         raise AirflockError("infer: no laws to choose from; name models, such as couzin_2002")
     say = done or (lambda _: None)
-    scenarios, box = law_scenarios(models, dict(settings or {}), trust=trust)
+    scenarios, box = law_scenarios(models, dict(settings or {}), topologies, trust=trust)
     recordings = read_recordings(tracks)
     followed = [tracks_from_recording(recording, name, box=box) for name, recording in recordings]
     _alike(followed)
     scale = tracks_scale(followed)
     comparison = _Comparison(followed, scale, seed, say)
-    laws, by_name = comparison.of([make_candidate(each, scale, followed[0].axes) for each in scenarios])
+    laws = comparison.of([make_candidate(each, scale, followed[0].axes) for each in scenarios])
+    if judge_laws(laws)[0] is not None:
+        comparison.contest(laws)
+    for law in laws:
+        comparison.finish(law)
     best, verdict = judge_laws(laws)
     result = InferResult(
         laws, best, verdict, sum(each.counted for each in followed), comparison.frames(), scale,
         max(each.individual_count for each in followed),
     )  # fmt: skip
-    if best is None:
-        return result, comparison, None
-    comparison.contest(laws, by_name)
-    result.best, result.verdict = judge_laws(laws)
-    return result, comparison, by_name[result.best.name] if result.best else None
+    if best is not None:
+        best.by_chance = comparison.by_chance(best)
+        if not beats_chance(best):
+            result.best, result.verdict = None, (
+                f"none of these explains the tracks: {best.name} gains {best.gain:.0f} ± {best.error:.0f}, and "
+                f"{best.by_chance[0]:.0f} ± {best.by_chance[1]:.0f} where each individual is shifted in time, so that "
+                "nobody meets anybody"
+            )  # fmt: skip
+    return result, comparison
+
+
+def beats_chance(law: LawResult) -> bool:
+    """Return True if a law gains more than on tracks on which nobody meets anybody."""
+    gain, error = law.by_chance or (0.0, 0.0)
+    return law.gain - max(gain, 0.0) > SURE * math.hypot(law.error, error)
 
 
 class _Comparison:
     """Comparison of laws with going straight on, on the same tracks.
 
-    spans : those on which is fitted
+    spans : those on which the law found is fitted; halves : spans of which each half is predicted by the other
     """
 
     def __init__(self, followed: Sequence[SpanTracks], scale: TrackScale, seed: int, say: Callable[[str], None]):
         self.followed, self.scale, self.seed, self.say = followed, scale, seed, say
         self.reference, self.straight = law_selection.straight_model(followed, scale)
-        self.plain = law_selection.cross_validate(self.reference, self.straight, lambda: say("going straight on"))
+        self.halves = law_selection.make_halves(self.reference)
+        self.own = [law_selection.straight_model(followed, scale, half) for half in self.halves]
+        self.plain = law_selection.predict_held_out(self.own, self.halves)
         self.spans = law_selection.sample_spans(self.reference)
         self.laws: dict[str, LawCandidate] = {}
+        self.fits: dict[str, list[tuple[FitModel, Fit]]] = {}
 
     def frames(self) -> tuple[int, int]:
         """Return the number of frames on which laws are fitted, and of all."""
         chosen = (self.followed[t].spans[s] for t, s in (self.reference.spans[k] for k in self.spans))
         return sum(end - begin for begin, end in chosen), sum(len(each.seen) for each in self.followed)
 
-    def of(self, candidates: Sequence[LawCandidate]) -> tuple[list[LawResult], dict[str, FitModel]]:
-        """Return laws from best to worst, and the model of each by its name."""
+    def of(self, candidates: Sequence[LawCandidate]) -> list[LawResult]:
+        """Return laws from best to worst."""
         self.laws = {each.name: each for each in candidates}
-        laws, models = [], {}
         for each in candidates:
-            say = _teller(self.say, each.name)
-            models[each.name], fit = self.fitted(each, self.seed, say)
-            laws.append(self.judged(each.name, models[each.name], fit, say))
-        laws.sort(key=lambda law: -law.gain)
-        return laws, models
+            self.fits[each.name] = self.fitted(each, self.seed, _teller(self.say, each.name))
+        return sorted((self.judged(each.name) for each in candidates), key=lambda law: -law.gain)
 
-    def fitted(self, law: LawCandidate, seed: int, say: Callable[[], None]) -> tuple[FitModel, Fit]:
-        """Fit a law, raced from points drawn by a seed."""
-        gains = self.straight.place[self.reference.named :]
-        return law_selection.fit_law(law, self.followed, self.scale, gains, seed, say)
+    def fitted(self, law: LawCandidate, seed: int, say: Callable[[], None]) -> list[tuple[FitModel, Fit]]:
+        """Fit a law to each half alone, raced from points drawn by a seed."""
+        found = []
+        for half, (straight, plain) in zip(self.halves, self.own, strict=True):
+            gains = plain.place[straight.named :]
+            found.append(law_selection.fit_law(law, self.followed, self.scale, gains, seed, half, say))
+        return found
 
-    def contest(self, laws: list[LawResult], models: dict[str, FitModel]) -> None:
+    def contest(self, laws: list[LawResult]) -> None:
         """Search deeper for the best law, and for each that is not worse with certainty; sort the laws again.
 
         A law may lose for want of searching alone: a short search ends on another hill now and
-        then.
+        then. Which search was the better one is decided by the half that was fitted.
         """
         searched: set[str] = set()
         while waiting := [law for law in (laws[0], *indistinguishable_laws(laws)) if law.name not in searched]:
             law = waiting[0]
-            models[law.name], deeper = self.deeper(law, models[law.name])
+            deeper = self.deeper(law.name)
             laws[:] = sorted((deeper if each is law else each for each in laws), key=lambda each: -each.gain)
             searched.add(law.name)
 
-    def deeper(self, law: LawResult, model: FitModel) -> tuple[FitModel, LawResult]:
-        """Search a law deeper, without numbers that the others compensate for; judge it again."""
-        own, say = self.laws[law.name], _teller(self.say, f"{law.name}, simplified")
-        tried = [(model, law.fit), *(self.fitted(own, self.seed + more, say) for more in range(1, RACES))]
-        model, fit = law_selection.fit_minimal(own, *min(tried, key=lambda each: each[1].loss), say)
-        return model, self.judged(law.name, model, fit, say)
+    def deeper(self, name: str) -> LawResult:
+        """Search a law from more points, and judge it again."""
+        for more in range(1, RACES):
+            tried = self.fitted(self.laws[name], self.seed + more, _teller(self.say, f"{name}, searched again"))
+            both = zip(self.fits[name], tried, strict=True)
+            self.fits[name] = [min(pair, key=lambda each: each[1].loss) for pair in both]
+        return self.judged(name)
 
-    def judged(self, name: str, model: FitModel, fit: Fit, say: Callable[[], None]) -> LawResult:
-        """Judge how well a fitted law predicts unseen spans."""
-        assert model.law is not None
-        held = law_selection.cross_validate(model, fit, say)
+    def judged(self, name: str) -> LawResult:
+        """Judge how well a law predicts the half that its fit has not seen."""
+        held = law_selection.predict_held_out(self.fits[name], self.halves)
         ahead = self.plain.negative_log_likelihoods - held.negative_log_likelihoods
-        numbers = {
-            n.key: ParameterEstimate(n.key, n.value(fit.place[k]), None, None, n.unit)
-            for k, n in enumerate(model.numbers[: model.named])
-        }
-        bare = fit.score.loss() + len(fit.free), self.straight.score.loss() + len(self.straight.free)
-        left, gained = (
-            lack_of_fit(model, fit.place, self.spans),
-            max(self.straight.score.loss() - fit.score.loss(), 0.0),
-        )
+        model, fit = max(self.fits[name], key=lambda each: each[0].named)
         return LawResult(
             name, float(ahead.sum()), float(np.sqrt(len(ahead)) * ahead.std(ddof=1)), float((ahead > 0.0).mean()),
-            0.5 * len(numbers) * math.log(max(sum(each.counted for each in model.tracks), 2)),
-            2.0 * (bare[0] - bare[1]), held.inside, left / max(gained + left, 1e-9), numbers, model.law, fit,
-            force_maps(model, fit.place, self.scale, self.spans), held.negative_log_likelihoods,
+            0.5 * model.named * math.log(max(sum(each.counted for each in model.tracks), 2)), 0.0, held.inside, 0.0,
+            _estimates(model, fit), self.laws[name], fit, None, held.negative_log_likelihoods,
         )  # fmt: skip
+
+    def by_chance(self, law: LawResult) -> tuple[float, float]:
+        """Return the gain of a law, and its error, on the tracks with each individual shifted in time.
+
+        Everybody moves as before, and meets the walls; but neighbours are where others were. What the law gains there
+        is what the best of many places gains without any interaction.
+        """
+        say = lambda _: self.say(f"{law.name}, by chance")  # noqa: E731
+        null = _Comparison([shifted_in_time(each) for each in self.followed], self.scale, self.seed, say)
+        (found,) = null.of([self.laws[law.name]])
+        return found.gain, found.error
+
+    def finish(self, law: LawResult) -> FitModel:
+        """Fit a law to all spans from what was fitted to the halves, for its numbers, its maps and what it misses."""
+        return self.complete(law, *law_selection.merge_fits(self.laws[law.name], self.fits[law.name]))
+
+    def simplify(self, law: LawResult) -> FitModel:
+        """Search the law found on all spans, without numbers that the others compensate for."""
+        say = _teller(self.say, f"{law.name}, simplified")
+        model, fit = law_selection.merge_fits(self.laws[law.name], self.fits[law.name])
+        return self.complete(law, *law_selection.fit_minimal(self.laws[law.name], model, fit, say))
+
+    def complete(self, law: LawResult, model: FitModel, fit: Fit) -> FitModel:
+        """Enter what a fit to all spans says."""
+        assert model.law is not None
+        bare = fit.score.loss() + len(fit.free), self.straight.score.loss() + len(self.straight.free)
+        left = lack_of_fit(model, fit.place, self.spans)
+        gained = max(self.straight.score.loss() - fit.score.loss(), 0.0)
+        law.candidate, law.fit, law.numbers = model.law, fit, _estimates(model, fit)
+        law.aic_difference, law.missed = 2.0 * (bare[0] - bare[1]), left / max(gained + left, 1e-9)
+        law.maps = force_maps(model, fit.place, self.scale, self.spans)
+        return model
+
+
+def _estimates(model: FitModel, fit: Fit) -> dict[str, ParameterEstimate]:
+    named = enumerate(model.numbers[: model.named])
+    return {n.key: ParameterEstimate(n.key, n.value(fit.place[k]), None, None, n.unit) for k, n in named}
 
 
 def _teller(say: Callable[[str], None], name: str) -> Callable[[], None]:

@@ -306,8 +306,8 @@ def _normal(
 # while the others follow (a profile of the likelihood), which leaves modes that lie a valley apart.
 # CMA-ES with 1,600 evaluations was lost among switches that close a part of the law; Sobol points
 # with a race were not.
-DRAWN = 9  # two to the power of this: places that are looked at
-RACE = ((16, 4), (8, 4), (4, 8))  # how many climb, and by how many steps
+DRAWN = 8  # two to the power of this: places that are looked at
+RACE = ((10, 3), (5, 4), (2, 8))  # how many climb, and by how many steps
 SCAN = 10  # places along the range of one number
 PROFILE, FOLLOW = 6, 2  # the same while the others follow, by so many steps
 SWEEPS = 3  # of all numbers
@@ -375,7 +375,9 @@ def scan_ranges(model: FitModel, point: Array, free: Sequence[int], spans: Seque
     """
     lowest, best, moved = loss_at(model, point, free, spans), point, False
     for k in [k for k in free if k < model.named]:
-        for x in (np.arange(SCAN) + 0.5) / SCAN:
+        n = model.numbers[k]
+        whole = [n.place(value) for value in range(int(n.low), int(n.high))] if n.whole else []
+        for x in whole or (np.arange(SCAN) + 0.5) / SCAN:
             u = best.copy()
             u[k] = x
             found = loss_at(model, u, free, spans)

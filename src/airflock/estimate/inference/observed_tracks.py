@@ -64,13 +64,19 @@ class SpanTracks:
 
 @dataclass(frozen=True)
 class TrackScale:
-    """Observed lengths and speeds: nearest and farthest pair (m), median and largest speed (m/s), period (s)."""
+    """Observed lengths and speeds: nearest and farthest pair (m), median and largest speed (m/s), period (s).
+
+    begin : radius (m) of the disc or ball with the spread of the first frame
+    length : of the longest recording, s
+    """
 
     near: float
     far: float
     speed: float
     max_speed: float
     period: float
+    begin: float = 0.0
+    length: float = 0.0
 
 
 def tracks_from_recording(
@@ -131,6 +137,21 @@ def with_positions(tracks: SpanTracks, positions: Array) -> SpanTracks:
     return replace(tracks, seen=np.ascontiguousarray(positions), state=state, speed=speed)
 
 
+def shifted_in_time(tracks: SpanTracks) -> SpanTracks:
+    """Return the tracks with each individual at a time of its own: all move as they did, and nobody meets anybody.
+
+    Shifts are spread evenly over the recording; where an end meets the beginning, the individual leaves and enters.
+    """
+    frames, n = len(tracks.seen), tracks.individual_count
+    away = max(2, round(LONGEST_GAP / tracks.period)) + 1
+    seen = tracks.seen.copy()
+    for i in range(n):
+        shift = round(i * frames / n)
+        seen[:, :, i] = np.roll(tracks.seen[:, :, i], shift, axis=0)
+        seen[shift : shift + away if shift else 0, :, i] = np.nan
+    return with_positions(tracks, seen)
+
+
 def nearest_image(offset: Array, box: tuple[float, ...], axis: int) -> Array:
     """Return offsets (m) to the nearest image of a periodic box; `axis` is that of coordinates."""
     found = offset.copy()
@@ -188,5 +209,16 @@ def tracks_scale(all_tracks: list[SpanTracks]) -> TrackScale:
         )
     return TrackScale(
         float(np.median(near)), float(np.quantile(far, 0.9)), float(np.median(speed)),
-        float(np.quantile(speed, 0.999)), all_tracks[0].period,
+        float(np.quantile(speed, 0.999)), all_tracks[0].period, _first_radius(all_tracks[0]),
+        max(len(tracks.seen) for tracks in all_tracks) * all_tracks[0].period,
     )  # fmt: skip
+
+
+def _first_radius(tracks: SpanTracks) -> float:
+    """Return the radius (m) of the even disc or ball that is as wide as the flock when most are first seen."""
+    seen: Any = np.isfinite(tracks.seen).all(axis=1)
+    first = int(np.argmax(seen.sum(axis=1) >= 0.9 * seen.sum(axis=1).max()))
+    x = tracks.seen[first][:, seen[first]]
+    out = nearest_image(x - x[:, :1], tracks.box, 0)
+    spread = float(((out - out.mean(axis=1, keepdims=True)) ** 2).sum(axis=0).mean())
+    return (spread * (tracks.axes + 2.0) / tracks.axes) ** 0.5  # of an even ball the mean square is axes/(axes+2) R²

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.estimate.inference.identifiability import Ridges, profile_ridges, ridges_of_dropped
-from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter, compiled_loops
+from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter
 from airflock.estimate.inference.law_candidates import LawCandidate
 from airflock.estimate.inference.likelihood_fit import (
     CENTRAL_SLOPES,
@@ -59,7 +59,7 @@ class FitNoise:
         return replace(self, law=law, speed=speed, seen=seen)
 
 
-def fly_span(
+def fly_freely(
     walk: InnovationFilter,
     fitted: tuple[dict[int, float], FilterGains, float],
     noise: FitNoise,
@@ -77,13 +77,13 @@ def fly_span(
     """
     numbers, gains, usual = fitted
     columns = {**numbers, **({noise.column: noise.law} if noise.column >= 0 else {})}
-    own_speed = walk.law is not None and walk.law.commands_heading
+    wander = noise.speed if walk.law is not None and walk.law.commands_heading else -1.0
+    pushed, blurred = (noise.law if noise.column == kind else 0.0 for kind in (PUSHED, BLURRED))
     flown = np.zeros((len(state), 2 * walk.axes, walk.tracks.individual_count))
-    compiled_loops()[2](
-        *walk.begin(columns, usual, world), state, follow, generator,
-        noise.law if noise.column == PUSHED else 0.0, noise.law if noise.column == BLURRED else 0.0,
-        math.exp(-walk.tracks.period / LASTING), noise.speed if own_speed else -1.0, walk.axes, walk.half_sides, usual,
-        gains.keep, flown,
+    draws = generator.normal(size=(len(state), 2 * walk.axes + 1, walk.tracks.individual_count))
+    walk.loops.fly_span(
+        *walk.begin(columns, usual, world), state, follow, draws, np.zeros_like(flown[0]), pushed, blurred,
+        math.exp(-walk.tracks.period / LASTING), wander, walk.axes, walk.half_sides, usual, gains.keep, flown,
     )  # fmt: skip
     return flown
 
@@ -107,7 +107,7 @@ def fly_tracks(
     for s in spans:
         part = slice(*tracks.spans[s])
         world = (seed * 1009 + s + 1) % 2**31
-        flown = fly_span(walk, fitted, noise, tracks.state[part], filtered_states[part], world, generator)
+        flown = fly_freely(walk, fitted, noise, tracks.state[part], filtered_states[part], world, generator)
         noisy = flown[:, : walk.axes] + generator.normal(0.0, noise.seen, seen[part].shape)
         seen[part] = np.where((tracks.state[part] > UNSEEN)[:, None], noisy, np.nan)
     return with_positions(tracks, seen)
@@ -213,6 +213,7 @@ FLOWN = 40  # flights of each look
 RANGE = 1.6  # of the logarithm of noise, to each side, at the first look
 NARROW = 0.15  # at the second, at least
 BESIDE = 1.25  # of the interval: range of the second look
+INNER = 0.95  # of a look to each side: farther out is its edge
 OTHERS = (0.7, 0.15)  # of the logarithms of noise of the own speed, and of the tracks: to each side
 MOVED = 4  # times that the first look is made, each where the one before points to
 POWERS = 3  # of the curves
@@ -248,15 +249,24 @@ def estimate_law_noise(
             break
     bottom, top = (centre - half if low is None else low), (centre + half if high is None else high)
     centre, half = 0.5 * (bottom + top), max(0.5 * BESIDE * (top - bottom), NARROW)
-    steps, intervals = _look(flights, point, scatter, noise, fitted, levels, centre, half, generator)
+    # A likeliest noise at the edge of a look lies beyond it: look again from there.
+    for _ in range(MOVED):
+        steps, intervals = _look(flights, point, scatter, noise, fitted, levels, centre, half, generator)
+        if abs(steps[0] - centre) < INNER * half:
+            break
+        centre, half = float(steps[0]), 2.0 * half
     ends: list[IntervalEnds] = []
     for (low, high), (before, after) in zip(intervals, first, strict=True):
-        below = centre - half if low is None and before is not None else low
-        above = centre + half if high is None and after is not None else high
+        below = None if low is None and before is None else min(x for x in (low, before, steps[0]) if x is not None)
+        above = None if high is None and after is None else max(x for x in (high, after, steps[0]) if x is not None)
+        if low is not None and high is not None:
+            below, above = low, high
         ends.append(
             (None if below is None else noise.law * float(np.exp(below)),
              None if above is None else noise.law * float(np.exp(above)))
         )  # fmt: skip
+    if abs(steps[0] - centre) >= INNER * half:  # still at an edge: there is no limit on that side
+        ends = [(low, None) if steps[0] > centre else (None, high) for low, high in ends]
     return noise.shifted(steps), ends
 
 
@@ -457,16 +467,16 @@ def _noise(
     from scipy.stats import norm as normal
 
     noise, ends = estimate_law_noise(flights, place, scatter, noise, fitted, shares, len(flights.spans))
-    found: list[IntervalEnds] = []
-    for share, (low, high) in zip(shares, ends, strict=True):
-        more = float(normal.ppf(share)) * BEYOND[1]
-        found.append((_farther(noise.law, low, more), _farther(noise.law, high, more)))
-    return noise, found
+    more = [float(normal.ppf(share)) * BEYOND[1] for share in shares]
+    return noise, [widened_ends(noise.law, *each) for each in zip(ends, more, strict=True)]
 
 
-def _farther(value: float, end: float | None, more: float) -> float | None:
-    """Move an end outwards on a logarithmic scale, by what flights leave out."""
-    if end is None:
-        return None
-    away = float(np.log(end / value))
-    return value * float(np.exp(np.copysign(np.hypot(away, more), away)))
+def widened_ends(value: float, ends: IntervalEnds, more: float) -> IntervalEnds:
+    """Move both ends outwards on a logarithmic scale, by what flights leave out; the value lies between them."""
+    low, high = ends
+    below = 0.0 if low is None else max(math.log(value / low), 0.0)
+    above = 0.0 if high is None else max(math.log(high / value), 0.0)
+    return (
+        None if low is None else value * math.exp(-math.hypot(below, more)),
+        None if high is None else value * math.exp(math.hypot(above, more)),
+    )
