@@ -28,7 +28,6 @@ from fleets import fleet, scenario  # noqa: E402
 SEED, FLIGHTS = "autopilots as they are", 100
 STARTS, RETURN, END = (15.0, 30.0, 60.0), 110.0, 240.0  # s; orders, and when everybody must stand
 REPORT_TIME = 7.0  # s from a fault to the line that names it
-SPREAD = 2.0  # times the grid of 4 m on which the fleets in software stand: 8 m
 GROUND, TOUCH, NEAR, FEW = 0.5, 1.0, 3.0, 3  # m, m, m, flights
 FIELDS = ("flight", "drones", "least_m", "at_s", "one", "other", "flew", "refused", "fell", "faults", "errors")
 # What a drone may report without a fault of its own. A peer that is not heard must have a fault.
@@ -78,8 +77,7 @@ def flown(number):
     found = scenario(agents, END, True, **{"radio.delay": 0.2})
     made = fleet(found, number, faults=faults, autopilot="ardupilot", safety={"tick": 0.05, "status_period": 0.1})
     for v in made.vehicles:
-        v.state = v.state._replace(x=SPREAD * v.state.x, y=SPREAD * v.state.y)
-        v.home, v.origin, v.booted_at = v.state[:3], v.site.to_geodetic(*v.state[:3]), -60.0
+        v.booted_at = -60.0
     for at in STARTS:
         made.advance(at - made.now)
         made.order(OrderKind.START, at=made.now)

@@ -289,6 +289,33 @@ def test_a_vehicle_without_motors_lies_on_the_ground_whatever_it_is_asked():
 # ------------------------------------------------------------------------------------------------ whole missions
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+def test_drones_that_take_off_beside_each_other_keep_apart(kind, seed):
+    """Each keeps its place by a position that is off by a metre, and drifts; all start at the first order."""
+    f = fleet(scenario(6, noisy=True), seed, autopilot=kind)
+    f.advance(10.0)
+    f.order(OrderKind.START, at=10.0)
+    f.advance(35.0)
+    assert set(f.phases()) <= {MissionPhase.GATHER, MissionPhase.FLOCK}, (seed, f.log[-6:])
+    at = f.array()[:, :, :3]
+    gaps = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1) + 1e3 * np.eye(6)
+    assert gaps.min() > 3.0, (seed, gaps.min())
+
+
+@pytest.mark.parametrize(("apart", "errors", "starts"), [
+    (4.0, (0.3, 0.3), True), (4.0, (0.7, 0.7), False), (4.0, (0.2, 1.2), False), (8.0, (2.0, 2.0), True),
+])  # fmt: skip
+def test_drones_arm_only_if_they_stand_apart_whatever_the_errors_of_their_positions(apart, errors, starts):
+    f = fleet(scenario(2))
+    for x, error, v in zip((0.0, apart), errors, f.vehicles, strict=True):
+        v.state, v.accuracy = v.state._replace(x=x, y=0.0), error
+    f.advance(10.0)
+    assert (set(f.phases()) == {MissionPhase.CLEARED}) == starts
+    missing = [note for _, _, note in f.log if "stands 4.0 m away; needs 3 m and the accuracy of both" in note]
+    assert bool(missing) != starts
+
+
 @pytest.mark.parametrize("kind", ["px4", "ardupilot"])
 def test_a_whole_mission_from_the_ground_and_back(kind):
     f = fleet(scenario(3, 300.0, **{"radio.delay": 0.2}), autopilot=kind)

@@ -622,13 +622,21 @@ class SoftwareVehicle:
         if self.mode not in (mode, LAND_MODE) and self.now - self._low_since > LOW_VOLTAGE_SECONDS:
             self._fail_safe(mode, f"Battery 1 is low {self.voltage:.2f}V used {self._used_charge:.0f} mAh")
 
+    @property
+    def _missing_height(self) -> float:
+        """Return how far it is below the height of its take-off, m."""
+        return self.takeoff_height - (self.state.z - self.home[2])
+
     def autopilot_velocity(self) -> Velocity:
         """Return the velocity that the autopilot commands now, m/s."""
         self._check_fail_safes()
-        late = self.now - self.setpoint_at
+        late, at = self.now - self.setpoint_at, self.controller_state if self.frozen_state is None else None
         if self.mode in (LAND_MODE, HOLD_MODE, PILOT_MODE):
-            at, self.is_taking_off = self.controller_state if self.frozen_state is None else None, False
+            self.is_taking_off = False
             return self._holding.velocity(at, -self._landing_speed() if self.mode == LAND_MODE else 0.0)
+        # Without it the noise of its motion took one 4 m aside while it climbed, next to its neighbour.
+        if self.is_taking_off and self.now >= self._lifts_at and self._missing_height > 0.2:
+            return self._holding.velocity(at, max(0.3, min(2.0, self._missing_height)))
         self._holding.release()
         if self.mode == RETURN_MODE:
             dx, dy = self.home[0] - self.state.x, self.home[1] - self.state.y
@@ -637,8 +645,6 @@ class SoftwareVehicle:
             return (0.0, 0.0, -self._landing_speed()) if far < 0.5 else (dx * speed, dy * speed, 0.0)
         if self.is_taking_off and self.now < self._lifts_at:
             return NO_VELOCITY
-        if self.is_taking_off and self.state.z - self.home[2] < self.takeoff_height - 0.2:
-            return 0.0, 0.0, max(0.3, min(2.0, self.takeoff_height - self.state.z))
         if self.mode == TAKEOFF_MODE:
             self.mode = HOLD_MODE
         self.is_taking_off = False

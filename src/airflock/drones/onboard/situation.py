@@ -202,10 +202,15 @@ def _missing_peers(card: FlightCard, wire: AutopilotLink, peers: Peers, now: flo
         elif len(peer.packet_ages) == AGE_COUNT and min(peer.packet_ages) < -card.safety.clock_error:
             ahead = -min(peer.packet_ages)
             missing.append(f"clock: drone {who} sends from {ahead:.2f} s in the future; one of the two clocks is wrong")
-        elif wire.state is not None and peer.state is not None:
+        elif wire.state is not None and peer.state is not None and peer.status is not None:
             distance = state_distance(wire.state, peer.state)
-            if distance < card.safety.start_apart:
-                missing.append(f"drone {who} stands {distance:.1f} m away; needs {card.safety.start_apart:g} m")
+            # They may stand nearer than they report, and climb by positions that are off by as much.
+            errors = wire.horizontal_accuracy + peer.status.accuracy
+            if distance < card.safety.start_apart + errors:
+                missing.append(
+                    f"drone {who} stands {distance:.1f} m away; needs {card.safety.start_apart:g} m and the accuracy "
+                    f"of both positions, {errors:.1f} m"
+                )
     return missing
 
 
