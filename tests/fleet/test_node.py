@@ -541,6 +541,7 @@ def test_an_autopilot_that_is_not_as_quick_as_its_card_says_is_not_cleared(kind,
     (check,) = (check for check in made.parameter_checks if check.name == name)
     relied_on = {
         "accel": 2.5 if body == "autopilot" else 6.0, "speed": 6.0, "jerk": 5.0 if body == "autopilot" else 20.0,
+        "gain": 1.0 / 1.2 if body == "autopilot" else 1.0, "tilt": 14.3 if body == "autopilot" else 31.46,
     }[check.limits]  # fmt: skip
     for share, missed in ((1.0, False), (0.81, False), (0.79, True)):
         vehicle = SoftwareVehicle(

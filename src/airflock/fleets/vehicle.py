@@ -261,7 +261,10 @@ class SoftwareVehicle:
         ours = ("MAV_SYS_ID",) if kind == "px4" else ("SYSID_THISMAV", "SYSID_MYGCS")
         self.parameters = DEFAULT_PARAMETERS[kind] | dict.fromkeys(ours, system)
         # As quick as its body: limits that this has not are out of reach.
-        limits = {"accel": getattr(b, "a_max", 50.0), "jerk": getattr(b, "jerk", 1e4), "speed": 60.0}
+        limits = {
+            "accel": getattr(b, "a_max", 50.0), "jerk": getattr(b, "jerk", 1e4), "speed": 60.0, "tilt": 45.0,
+            "gain": 1.0 / getattr(b, "tau", 0.56),
+        }  # fmt: skip
         checks = (check for check in self.autopilot.parameter_checks if check.limits)
         self.parameters |= {check.name: check.scale * limits[check.limits] for check in checks}
         self.target: Velocity = (0.0, 0.0, 0.0)

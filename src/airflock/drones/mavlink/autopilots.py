@@ -1,6 +1,9 @@
 """Autopilots: modes of PX4 and ArduPilot, the commands that fly them, and the parameters that make a flight safe.
 
-Sources: PX4 user guide, pages Offboard Mode and Parameter Reference; ArduPilot Copter, pages Guided
+Sources: PX4 user guide, pages Offboard Mode and Parameter Reference, and its module mc_pos_control,
+which hands the velocities of Offboard Mode to its controller as they are: MPC_ACC_HOR and
+MPC_JERK_AUTO shape the modes that plan a path, not this one. What limits it is the tilt, the gain
+of the velocity and MPC_XY_VEL_MAX (defaults of v1.13 to main: 45 deg, 1.8 1/s, 12 m/s). ArduPilot Copter, pages Guided
 Mode, Copter Commands in Guided Mode and Complete Parameter List. Numbers of commands and messages:
 MAVLink common.xml.
 """
@@ -42,8 +45,8 @@ class ParameterCheck(NamedTuple):
     unsafe_value : a value inside the range that is not safe
     later_names  : its names in later versions of the autopilot
     later_unit   : unit of its value under a later name, in units of `name`
-    limits       : what of the drone's response it limits: accel (m/s²), jerk (m/s³) or speed (m/s); the card says what
-                   is needed, and `scale` is its unit
+    limits       : what of the drone's response it limits: accel (m/s²), jerk (m/s³), speed (m/s), tilt (degrees) or
+                   gain (1/s, of the velocity); the card says what is needed, and `scale` is its unit
     """
 
     name: str
@@ -179,8 +182,8 @@ AUTOPILOTS = {
                 "its own fence acts: 2 hold, 3 return, 5 land; 4 cuts the motors",
                 unsafe_value=4.0,
             ),
-            ParameterCheck("MPC_ACC_HOR", 0.0, math.inf, f"m/s^2; {RELIED_ON}", limits="accel"),
-            ParameterCheck("MPC_JERK_AUTO", 0.0, math.inf, f"m/s^3; {RELIED_ON}", limits="jerk"),
+            ParameterCheck("MPC_TILTMAX_AIR", 0.0, math.inf, f"deg; {RELIED_ON}", limits="tilt"),
+            ParameterCheck("MPC_XY_VEL_P_ACC", 0.0, math.inf, f"1/s; {RELIED_ON}", limits="gain"),
             ParameterCheck("MPC_XY_VEL_MAX", 0.0, math.inf, f"m/s; {RELIED_ON}", limits="speed"),
         ),
         battery_parameters={

@@ -9,7 +9,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite
+from math import atan2, degrees, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +139,7 @@ def read_public_key(text: Any, errors: list[str]) -> bytes:
 
 
 OWN_CHOICE = "our choice"
+GRAVITY = 9.80665  # m/s²
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -421,7 +422,11 @@ class FlightCard:
         s = self.safety
         # A body without a limit of jerk is one whose acceleration is there at once.
         jerk = getattr(self.body_parameters, "jerk", s.accel / (MAX_RAMP * s.response))
-        needed = {"accel": s.accel, "jerk": jerk, "speed": s.speed_max}
+        # A multirotor accelerates by its tilt; a gain of 1/s answers in its inverse.
+        needed = {
+            "accel": s.accel, "jerk": jerk, "speed": s.speed_max, "tilt": degrees(atan2(s.accel, GRAVITY)),
+            "gain": 1.0 / s.response,
+        }  # fmt: skip
         return tuple(c.reaching(needed[c.limits]) if c.limits else c for c in self.autopilot.parameter_checks)
 
     def layer(self, member: int) -> float:
