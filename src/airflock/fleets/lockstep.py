@@ -205,7 +205,42 @@ ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
 HEARD_SINCE = -1e8  # s; a peer whose last state held before this has not been heard
 
 
-class LockstepFleet:
+class FlownFleet:
+    """A fleet that has flown, with what was recorded of it once a period.
+
+    frames      : (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node; nan
+                  once a drone has dropped out, as in the recording of a simulation
+    state_times : (time, receiver, sender): time of the last state that a node has of another one, s
+    log         : time (s), member and text of each note
+    """
+
+    def __init__(self, scenario: Scenario, card: FlightCard, seed: int, faults: Sequence[InjectedFault]):
+        self.scenario, self.card, self.seed, self.faults = scenario, card, seed, tuple(faults)
+        self.frames: list[list[Sequence[float]]] = []
+        self.state_times: list[list[list[float]]] = []
+        self.log: list[tuple[float, int, str]] = []
+
+    @property
+    def law_zero_height(self) -> float:
+        """Return the height (m) above the site of the law's zero."""
+        return law_zero_height(self.card)
+
+    def array(self) -> NDArray[np.float64]:
+        """Return the frames (time, agent, 15)."""
+        return np.array(self.frames, float)
+
+    def packet_ages(self) -> NDArray[np.float64]:
+        """Return (time, receiver, sender): age (s) of the state that a node has of another one; nan: none."""
+        stamps = np.array(self.state_times)
+        times = self.card.period * np.arange(len(stamps))
+        return np.where(stamps > HEARD_SINCE, times[:, None, None] - stamps, np.nan)
+
+    def digest(self) -> str:
+        """Return the SHA-256 of the flight."""
+        return hashlib.sha256(self.array().tobytes()).hexdigest()
+
+
+class LockstepFleet(FlownFleet):
     """Nodes with their vehicles on one virtual clock.
 
     scenario : body, sensors, radio and motion step of the simulated world
@@ -218,11 +253,11 @@ class LockstepFleet:
         self, scenario: Scenario, card: FlightCard, seed: int = 0, *, start: Sequence[State] | None = None,
         faults: Sequence[InjectedFault] = (), operator: bytes = b"",
     ):  # fmt: skip
-        self.scenario, self.card, self.seed, self.faults = scenario, card, seed, tuple(faults)
+        super().__init__(scenario, card, seed, faults)
         self._dt = scenario.flight.dt
         self._steps_per_period = max(1, round(card.period / self._dt))
         self._steps_per_tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
-        self.steps, self.frames, self.state_times, self.log = 0, [], [], []  # type: ignore[var-annotated]
+        self.steps = 0
         self.standing: list[list[bool]] = []  # (time, agent): who stands because it has lost somebody
         self._faults = drone_faults = DroneFaults(scenario, seed)
         self._bodies = [b for _, b in agent_records(scenario, len(card.members), seed)]
@@ -288,11 +323,6 @@ class LockstepFleet:
     def now(self) -> float:
         """Return the virtual time, s."""
         return self.steps * self._dt
-
-    @property
-    def law_zero_height(self) -> float:
-        """Return the height (m) above the site of the law's zero."""
-        return law_zero_height(self.card)
 
     def order(self, do: OrderKind, target: int = 0, at: float = 0.0, point: Geodetic | None = None) -> None:
         """Give an order as the operator's station would; it reaches every drone at once."""
@@ -386,23 +416,6 @@ class LockstepFleet:
             ]
         )
         self.standing.append([n.stands for n in self.nodes])
-
-    def array(self) -> NDArray[np.float64]:
-        """Return (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node.
-
-        Rows of drones that have dropped out are nan, as in the recording of a simulation.
-        """
-        return np.array(self.frames)
-
-    def packet_ages(self) -> NDArray[np.float64]:
-        """Return (time, receiver, sender): age (s) of the state that a node has of another one; nan: none."""
-        times = self._steps_per_period * self._dt * np.arange(len(self.state_times))
-        stamps = np.array(self.state_times)
-        return np.where(stamps > HEARD_SINCE, times[:, None, None] - stamps, np.nan)
-
-    def digest(self) -> str:
-        """Return the SHA-256 of the flight."""
-        return hashlib.sha256(self.array().tobytes()).hexdigest()
 
     def phases(self) -> list[MissionPhase]:
         """Return the phase of every node."""

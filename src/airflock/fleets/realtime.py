@@ -5,7 +5,6 @@ There is no time-out: a process that ends early is named in one line, and ends t
 """
 
 import asyncio
-import hashlib
 import math
 import multiprocessing
 import os
@@ -16,9 +15,6 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import wait
 from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from airflock.core import SensorState, State
 from airflock.drones import (
@@ -39,13 +35,14 @@ from airflock.fleets.card_document import agent_records
 from airflock.fleets.drone_faults import DroneFaults, InjectedFault, whole_flight_amount
 from airflock.fleets.fleet_observer import TelemetryBroadcast
 from airflock.fleets.lockstep import (
+    ABSENT_ROW,
     ACCEPTED_BEFORE_START,
     DROPS_OUT_NOTE,
     SECONDS_BEFORE_START,
+    FlownFleet,
     MotionNoise,
     OperatorStation,
     is_clear_between,
-    law_zero_height,
     make_vehicle,
     put_in_air,
 )
@@ -356,9 +353,6 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
     return TaskResult([], [], TickCounts(0, 0, 0.0), MissionPhase.DONE, time.process_time() - began)
 
 
-ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
-
-
 class ComputerLoad(NamedTuple):
     """Cost and lateness of a fleet on the real clock.
 
@@ -377,75 +371,31 @@ class ComputerLoad(NamedTuple):
     others: float
 
 
-class RealtimeFleet:
+class RealtimeFleet(FlownFleet):
     """A fleet that has flown on the real clock; recorded like one in lock-step."""
 
     def __init__(self, plan: RealtimePlan, results: Sequence[TaskResult], load: ComputerLoad):
-        self.scenario, self.card, self.seed, self.faults = plan.scenario, plan.card, plan.seed, plan.faults
+        super().__init__(plan.scenario, plan.card, plan.seed, plan.faults)
         self.load = load
         count = len(plan.card.members)
-        self._nodes, self._vehicles = results[1 : 1 + count], results[1 + count :]
+        self._nodes, vehicles = results[1 : 1 + count], results[1 + count :]
         self.log = sorted((t - plan.clock[0], who, note) for result in results[1:] for t, who, note in result.notes)
-
-    @property
-    def law_zero_height(self) -> float:
-        """Return the height (m) above the site of the law's zero."""
-        return law_zero_height(self.card)
-
-    def _frame_count(self) -> int:
-        return min(len(result.rows) for result in self._vehicles)
-
-    def array(self) -> NDArray[np.float64]:
-        """Return (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node.
-
-        Rows of drones that have dropped out are nan, as in the recording of a simulation.
-        """
-        frames = [
-            [
-                ABSENT_ROW
-                if _has_dropped_out(vehicle, k)
-                else (*vehicle.rows[k], *_row_part_at(node.rows, k, 0, (0.0,) * 9))
-                for vehicle, node in self._pairs()
-            ]
-            for k in range(self._frame_count())
-        ]
-        return np.array(frames, float)
-
-    def packet_ages(self) -> NDArray[np.float64]:
-        """Return (time, receiver, sender): age (s) of the state that a node has of another one; nan: none."""
-        never = [NEVER_HEARD] * len(self.card.members)
-        stamps = np.array(
-            [
+        unheard = (0.0,) * 9, [NEVER_HEARD] * count
+        for k in range(min(len(vehicle.rows) for vehicle in vehicles)):
+            # After its end a node counts with its last row.
+            rows = [node.rows[min(k, len(node.rows) - 1)] if node.rows else unheard for node in self._nodes]
+            gone = [math.isnan(vehicle.rows[k][0]) for vehicle in vehicles]
+            self.frames.append(
                 [
-                    never if _has_dropped_out(vehicle, k) else _row_part_at(node.rows, k, 1, never)
-                    for vehicle, node in self._pairs()
+                    ABSENT_ROW if out else (*vehicle.rows[k], *own)
+                    for vehicle, (own, _), out in zip(vehicles, rows, gone, strict=True)
                 ]
-                for k in range(self._frame_count())
-            ]
-        )
-        times = self.card.period * np.arange(len(stamps))
-        return np.where(stamps > 0.1 * NEVER_HEARD, times[:, None, None] - stamps, np.nan)
-
-    def _pairs(self) -> Any:
-        return zip(self._vehicles, self._nodes, strict=True)
-
-    def digest(self) -> str:
-        """Return the SHA-256 of the flight."""
-        return hashlib.sha256(self.array().tobytes()).hexdigest()
+            )
+            self.state_times.append([unheard[1] if out else ages for (_, ages), out in zip(rows, gone, strict=True)])
 
     def phases(self) -> list[MissionPhase]:
         """Return the last phase of every node."""
         return [result.phase for result in self._nodes]
-
-
-def _row_part_at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
-    """Return the entries of a node at period k; after its end, the last ones."""
-    return rows[min(k, len(rows) - 1)][part] if rows else none
-
-
-def _has_dropped_out(vehicle: TaskResult, k: int) -> bool:
-    """Return True if a vehicle has dropped out by period k."""
-    return bool(math.isnan(vehicle.rows[k][0]))
 
 
 FLEET_MODES = ("lockstep", "tasks", "processes")

@@ -159,6 +159,16 @@ def px4_mode(main: int, sub: int = 0) -> int:
 
 
 RELIED_ON = "the card relies on it; raise it, or prepare a card of body.kind = 'autopilot'"
+
+
+def _limit(name: str, limits: str, unit: str, *later_names: str, scale: float = 1.0) -> ParameterCheck:
+    """Return the check of a limit that a card relies on; its later names are in SI units."""
+    why = f"{unit}; {RELIED_ON}"
+    return ParameterCheck(
+        name, 0.0, math.inf, why, limits=limits, scale=scale, later_names=later_names, later_unit=scale
+    )
+
+
 # The ranges are ours where the manuals allow more: a drone that hovers after a lost link is hit by
 # one that flies on, so both autopilots must land.
 AUTOPILOTS = {
@@ -182,9 +192,9 @@ AUTOPILOTS = {
                 "its own fence acts: 2 hold, 3 return, 5 land; 4 cuts the motors",
                 unsafe_value=4.0,
             ),
-            ParameterCheck("MPC_TILTMAX_AIR", 0.0, math.inf, f"deg; {RELIED_ON}", limits="tilt"),
-            ParameterCheck("MPC_XY_VEL_P_ACC", 0.0, math.inf, f"1/s; {RELIED_ON}", limits="gain"),
-            ParameterCheck("MPC_XY_VEL_MAX", 0.0, math.inf, f"m/s; {RELIED_ON}", limits="speed"),
+            _limit("MPC_TILTMAX_AIR", "tilt", "deg"),
+            _limit("MPC_XY_VEL_P_ACC", "gain", "1/s"),
+            _limit("MPC_XY_VEL_MAX", "speed", "m/s"),
         ),
         battery_parameters={
             "BAT1_CAPACITY": "capacity in mAh, on which its per cent rest; -1: on the voltage alone",
@@ -215,35 +225,10 @@ AUTOPILOTS = {
                 own=True,
                 later_names=("MAV_GCS_SYSID",),  # since Copter 4.7, as all later names here
             ),
-            ParameterCheck(
-                "WPNAV_ACCEL",
-                0.0,
-                math.inf,
-                f"in cm/s^2 (WP_ACC: m/s^2); {RELIED_ON}",
-                limits="accel",
-                scale=100.0,
-                later_names=("WP_ACC",),
-                later_unit=100.0,
-            ),
+            _limit("WPNAV_ACCEL", "accel", "in cm/s^2 (WP_ACC: m/s^2)", "WP_ACC", scale=100.0),
             # Copter 4.7.0 and 4.7.1 name it differently.
-            ParameterCheck(
-                "PSC_JERK_XY",
-                0.0,
-                math.inf,
-                f"m/s^3; {RELIED_ON}",
-                limits="jerk",
-                later_names=("PSC_JERK_NE", "PSC_NE_JERK"),
-            ),
-            ParameterCheck(
-                "WPNAV_SPEED",
-                0.0,
-                math.inf,
-                f"in cm/s (WP_SPD: m/s); {RELIED_ON}",
-                limits="speed",
-                scale=100.0,
-                later_names=("WP_SPD",),
-                later_unit=100.0,
-            ),
+            _limit("PSC_JERK_XY", "jerk", "m/s^3", "PSC_JERK_NE", "PSC_NE_JERK"),
+            _limit("WPNAV_SPEED", "speed", "in cm/s (WP_SPD: m/s)", "WP_SPD", scale=100.0),
         ),
         battery_parameters={
             "BATT_CAPACITY": "capacity in mAh, on which its per cent rest: is it that of this battery?",
@@ -270,26 +255,9 @@ class AutopilotCommands:
     def velocity(self, velocity: tuple[float, float, float], boot_ms: int) -> bytes:
         """Pack a setpoint: velocity east, north, up, m/s."""
         vx, vy, vz = swap_enu_ned(*velocity)
-        return self._pack(
-            common_dialect().MAVLink_set_position_target_local_ned_message(
-                boot_ms & 0xFFFFFFFF,
-                self.system,
-                1,
-                LOCAL_NED_FRAME,
-                VELOCITY_ONLY_MASK,
-                0.0,
-                0.0,
-                0.0,
-                vx,
-                vy,
-                vz,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-            )  # fmt: skip
-        )
+        kind: Any = common_dialect().MAVLink_set_position_target_local_ned_message
+        head = boot_ms & 0xFFFFFFFF, self.system, 1, LOCAL_NED_FRAME, VELOCITY_ONLY_MASK
+        return self._pack(kind(*head, *3 * (0.0,), vx, vy, vz, *5 * (0.0,)))
 
     def command(self, number: int, *parameters: float) -> bytes:
         """Pack a command with up to seven parameters."""

@@ -7,6 +7,7 @@ debugger.
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +32,7 @@ from airflock.support import (
 )
 
 LOG_VERSION = 1
+NO_LOG_TEXT = "this is not a log of a flight on board"
 MAX_RADIOS = 16
 MAX_GAP = 3600.0  # s between two lines; a node ticks many times a second
 MAX_CLOCK = 1e12  # s; clocks count from the start of a computer
@@ -132,31 +134,37 @@ class LogTicks(NamedTuple):
 
 def read_log_ticks(path: Path) -> LogTicks:
     """Read the ticks of a log file; LinkError names the file and the line that is no log."""
-    with as_error(path, LinkError):
+    with _log_lines(path) as lines:
+        rows = enumerate(_rows(lines), 1)
+        _, head = next(rows, (0, {}))
+        begun, utc, member = _numbers_or_none([head.get("now")], 1), head.get("utc"), head.get("member")
+        if head.get("log") != LOG_VERSION or begun is None or type(utc) is not int or type(member) is not int:
+            raise LinkError(NO_LOG_TEXT)
+        ticks, before, stream = [], begun[0], FrameStream()
+        stamps: dict[tuple[float, float, float], tuple[float, float]] = {}
+        for number, row in rows:
+            before, data = _time_and_bytes(row, number, before)
+            if "a" in row:
+                for frame in stream(data):
+                    if (frame.system, frame.component) == (member, AUTOPILOT_COMPONENT):
+                        _stamp(frame, before, stamps)
+            if "out" in row:
+                tick = _tick(row, number, before)
+                ticks.append(tick._replace(stamp=None if tick.own is None else stamps.get(tick.own[3:])))
+                stamps.clear()
+        return LogTicks(member, begun[0], utc, ticks)
+
+
+@contextmanager
+def _log_lines(path: Path) -> Iterator[Iterable[str]]:
+    """Open the lines of a log; LinkError names its file."""
+    with as_error(path, LinkError), open(path, encoding="utf-8") as lines:
         try:
-            with open(path, encoding="utf-8") as lines:
-                rows = enumerate(_rows(lines), 1)
-                _, head = next(rows, (0, {}))
-                begun, utc, member = _numbers_or_none([head.get("now")], 1), head.get("utc"), head.get("member")
-                if head.get("log") != LOG_VERSION or begun is None or type(utc) is not int or type(member) is not int:
-                    raise LinkError("this is not a log of a flight on board")
-                ticks, before, stream = [], begun[0], FrameStream()
-                stamps: dict[tuple[float, float, float], tuple[float, float]] = {}
-                for number, row in rows:
-                    before, data = _time_and_bytes(row, number, before)
-                    if "a" in row:
-                        for frame in stream(data):
-                            if (frame.system, frame.component) == (member, AUTOPILOT_COMPONENT):
-                                _stamp(frame, before, stamps)
-                    if "out" in row:
-                        tick = _tick(row, number, before)
-                        ticks.append(tick._replace(stamp=None if tick.own is None else stamps.get(tick.own[3:])))
-                        stamps.clear()
-                return LogTicks(member, begun[0], utc, ticks)
+            yield lines
         except LinkError as error:
             raise LinkError(f"{path}: {error}") from error
         except UnicodeDecodeError as error:
-            raise LinkError(f"{path}: this is not a log of a flight on board") from error
+            raise LinkError(f"{path}: {NO_LOG_TEXT}") from error
 
 
 def _stamp(frame: MavlinkFrame, now: float, stamps: dict[tuple[float, float, float], tuple[float, float]]) -> None:
@@ -183,7 +191,7 @@ def replay(lines: Iterable[str], card: FlightCard, key: bytes) -> Iterator[Repla
     rows = enumerate(_rows(lines), 1)
     _, head = next(rows, (0, {}))
     if head.get("log") != LOG_VERSION:
-        raise LinkError("this is not a log of a flight on board")
+        raise LinkError(NO_LOG_TEXT)
     if head.get("card") != card.hash:
         raise LinkError("the log belongs to another card")
     node = _node_at_start(head, card, key)
@@ -244,14 +252,8 @@ def _is_number(value: Any) -> bool:
 
 def replay_log_file(path: Path, card: FlightCard, key: bytes) -> Iterator[ReplayedTick]:
     """Fly the log of a file again; LinkError names the file that belongs to another card or is no log."""
-    with as_error(path, LinkError):
-        try:
-            with open(path, encoding="utf-8") as lines:
-                yield from replay(lines, card, key)
-        except LinkError as error:
-            raise LinkError(f"{path}: {error}") from error
-        except UnicodeDecodeError as error:
-            raise LinkError(f"{path}: this is not a log of a flight on board") from error
+    with _log_lines(path) as lines:
+        yield from replay(lines, card, key)
 
 
 def _rows(lines: Iterable[str]) -> Iterator[dict[str, Any]]:

@@ -24,7 +24,7 @@ from airflock.drones.mavlink.signing import PacketReceiver, PacketSigner
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import FLYING_PHASES, NOT_FLOCKING_PHASES, MissionFacts, MissionPhase, next_step
 from airflock.drones.onboard.peers import ORDER_REFUSALS, AutopilotLink, OperatorOrders, Peers
-from airflock.drones.onboard.situation import ConditionTimers, NodeTick, explain_clock_offset, mission_facts
+from airflock.drones.onboard.situation import ConditionTimers, explain_clock_offset, mission_facts
 from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseVelocity, SteeringInput, Velocity
 
 ORIGIN_MESSAGE = 49
@@ -294,13 +294,8 @@ class Node:
             self._phase_velocity.goal = self.operator.goal
         if order == OrderKind.RESUME and self.phase != MissionPhase.MANUAL:
             self.operator.resume_ordered = False
-        tick = NodeTick(
-            now=now,
-            utc=self.utc(now),
-            phase=self.phase,
+        known = MissionFacts(
             phase_before_hold=self._phase_before_hold,
-            home=self.home,
-            has_twin=self._has_twin,
             has_flown=self._has_flown,
             order=order,
             is_overloaded=overload,
@@ -312,7 +307,10 @@ class Node:
             time_over=self._takeoff_at is not None and now - self._takeoff_at > s.mission_time,
         )
         explain_clock_offset(self.card, self.autopilot_link, self.peers, now)
-        return mission_facts(self.card, self.member, self.autopilot_link, self.peers, self.operator, self._timers, tick)
+        return mission_facts(
+            self.card, self.member, self.autopilot_link, self.peers, self.operator, self._timers, known, now=now,
+            utc=self.utc(now), phase=self.phase, home=self.home, has_twin=self._has_twin,
+        )  # fmt: skip
 
     def _is_goal_outside(self) -> bool:
         goal = self.operator.goal

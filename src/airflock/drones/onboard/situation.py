@@ -1,12 +1,10 @@
 """The situation: facts for the mission table, from autopilot, peers and operator, at one tick."""
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from airflock.core import State, norm
 from airflock.drones.mavlink.autopilots import STREAM_RATES
 from airflock.drones.mavlink.frames import common_dialect
-from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import FLYING_PHASES, MissionFacts, MissionPhase
 from airflock.drones.onboard.peers import (
@@ -36,32 +34,6 @@ MAX_EXPLAINED = 2.5
 GATHERED_PHASES = (MissionPhase.GATHER, MissionPhase.FLOCK, MissionPhase.GOTO, MissionPhase.HOLD)
 LANDED_PHASES = FLYING_PHASES - {MissionPhase.TAKEOFF} | {MissionPhase.LAND}  # those in which it counts
 LEAVING_PHASES = frozenset({MissionPhase.RETURN, MissionPhase.LAND, MissionPhase.DONE})
-
-
-class NodeTick(NamedTuple):
-    """Facts of one tick that only the node itself knows; fields without a line here are as in `MissionFacts`.
-
-    now, utc : own clock, s, and Unix time, µs
-    home     : position where it armed, in its own layer, m; None before
-    has_twin : another sender signs as this member
-    has_flown : it was in the air in a phase in which this node flies it
-    """
-
-    now: float
-    utc: int
-    phase: MissionPhase
-    phase_before_hold: MissionPhase
-    home: tuple[float, float, float] | None
-    has_twin: bool
-    has_flown: bool
-    order: OrderKind | None
-    is_overloaded: bool
-    overload_count: int
-    is_at_fence: bool
-    lost_near: bool
-    setpoints_for: float
-    phase_for: float
-    time_over: bool
 
 
 class ConditionTimers:
@@ -240,10 +212,22 @@ def mission_facts(
     peers: Peers,
     operator: OperatorOrders,
     timers: ConditionTimers,
-    tick: NodeTick,
+    known: MissionFacts,
+    *,
+    now: float,
+    utc: int,
+    phase: MissionPhase,
+    home: tuple[float, float, float] | None,
+    has_twin: bool,
 ) -> MissionFacts:
-    """Return all facts that the mission table uses, at one tick; only the timers remember something of it."""
-    s, own, now, phase = card.safety, link.state, tick.now, tick.phase
+    """Return all facts that the mission table uses, at one tick; only the timers remember something of it.
+
+    known    : those that only the node itself knows
+    now, utc : own clock, s, and Unix time, µs
+    home     : position where it armed, in its own layer, m; None before
+    has_twin : another sender signs as this member
+    """
+    s, own = card.safety, link.state
     alive = now - link.heartbeat_at <= MAX_HEARTBEAT_AGE
     flying = peers.flying()
     fresh = {who: peer for who, peer in flying.items() if now - peer.heard_at <= HEARD_WITHIN}
@@ -265,10 +249,10 @@ def mission_facts(
         "too few neighbours": few,
         "a suspicious clock": clock_bad,
         "a neighbour is near": near,
-        "overloaded": tick.is_overloaded,
+        "overloaded": known.is_overloaded,
         "the operator is lost": operator_lost and s.operator_lost == "hold",
         # The way home can be flown by slow streams: standing until the battery ends is worse.
-        "slow or silent streams": streams and tick.phase_before_hold != MissionPhase.RETURN,
+        "slow or silent streams": streams and known.phase_before_hold != MissionPhase.RETURN,
     }
     calm = not any(reasons_to_hold.values())
     # What was reported of the ground before its stream ended need not hold.
@@ -279,7 +263,7 @@ def mission_facts(
     stands = landed is True and not is_moving and phase in LANDED_PHASES
     landed = landed and not (is_high and position_bad == 0.0)
     missing = (
-        missing_before_start(card, member, link, peers, tick.utc, now)
+        missing_before_start(card, member, link, peers, utc, now)
         if phase in (MissionPhase.READY, MissionPhase.CLEARED)
         else ()
     )
@@ -289,9 +273,9 @@ def mission_facts(
     # An unknown battery keeps a drone on the ground; in the air it must not land everybody at once.
     battery = 100.0 if link.battery is None else link.battery
     # The reserve grows with the way home.
-    way = 0.0 if own is None or tick.home is None else state_distance(own, State(*tick.home, 0.0, 0.0, 0.0))
+    way = 0.0 if own is None or home is None else state_distance(own, State(*home, 0.0, 0.0, 0.0))
     layer = card.layer(member)
-    return MissionFacts(
+    return known._replace(
         in_guided_mode=link.mode == card.autopilot.ours,
         in_land_mode=link.mode == card.autopilot.land,
         in_failsafe=link.in_failsafe,
@@ -299,9 +283,7 @@ def mission_facts(
         is_landed=landed is True,
         is_airborne=landed is False,
         is_high=is_high,
-        has_flown=tick.has_flown,
         has_good_navigation=not (position_bad or gnss_bad),
-        order=tick.order,
         kill_confirmed=operator.kill_confirmed,
         resume_ordered=operator.resume_ordered,
         held=operator.held,
@@ -314,30 +296,22 @@ def mission_facts(
         battery_critical=battery < s.battery_critical,
         battery_needed_home=bool(link.battery_warning) or battery < s.battery_low + s.battery_way * way * 1e-3,
         outside_for=timers("outside", out, now),
-        is_at_fence=tick.is_at_fence,
-        lost_near=tick.lost_near,
         nobody_heard_for=timers("deaf", bool(flying) and not fresh, now),
         few_heard_for=few,
         clock_bad_for=clock_bad,
         operator_lost=operator_lost,
-        is_overloaded=tick.is_overloaded,
-        overload_count=tick.overload_count,
         present=alive and link.kind == card.autopilot.number and link.armed is not None,
-        fault=permanent_error(card, member, link, tick.has_twin, silent_for),
+        fault=permanent_error(card, member, link, has_twin, silent_for),
         missing=missing,
-        due=operator.due(tick.utc, card.turn(member)),
-        setpoints_for=tick.setpoints_for,
-        phase_for=tick.phase_for,
+        due=operator.due(utc, card.turn(member)),
         at_layer=own is not None and abs(own.z - layer) < LAYER_TOLERANCE,
         is_climbing=own is not None and own.vz > 0.2,
         neighbour_near=near,
         have_gathered=phase == MissionPhase.GATHER and _have_gathered(card, own, peers, now),
-        time_over=tick.time_over,
         member_joined=peers.member_joined,
         calm_for=timers("calm", calm, now),
         reasons_to_hold=tuple(reason for reason, holds in reasons_to_hold.items() if holds),
-        at_home=own is not None and tick.home is not None and _is_at_home(card, own, tick.home, layer),
-        phase_before_hold=tick.phase_before_hold,
+        at_home=own is not None and home is not None and _is_at_home(card, own, home, layer),
     )
 
 
