@@ -56,6 +56,7 @@ from .onboard.flight_log import (
 from .onboard.mission import (
     AIRBORNE_PHASES as AIRBORNE_PHASES,
     FLYING_PHASES as FLYING_PHASES,
+    STANDING_PHASES as STANDING_PHASES,
     MissionPhase as MissionPhase,
 )
 from .onboard.node import (

@@ -20,7 +20,6 @@ from .drone_faults import (
 from .fleet_observer import (
     DEFAULT_WATCH_ADDRESS as DEFAULT_WATCH_ADDRESS,
     FleetObserver as FleetObserver,
-    is_on_ground as is_on_ground,
     scenario_fault_name as scenario_fault_name,
 )
 from .flying import (

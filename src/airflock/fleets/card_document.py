@@ -172,17 +172,14 @@ def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> l
             f"not speak of {members}"
         )
     likely = default_safety(scenario)
-    for name in ("response", "delay"):
-        if getattr(safety, name) < getattr(likely, name):
+    times = [(name, "s is shorter", getattr(likely, name) - getattr(safety, name)) for name in ("response", "delay")]
+    rates = [(name, "m/s^2 is more", getattr(safety, name) - likely.accel) for name in ("accel", "brake")]
+    for name, what, excess in times + rates:
+        if excess > 0.0:
+            usual = getattr(likely, "accel" if name == "brake" else name)
             notes.append(
-                f"{name} = {getattr(safety, name):g} s is shorter than what the scenario gives a card, "
-                f"{getattr(likely, name):g} s: distances to stop come out too short, unless the drones are as quick"
-            )
-    for name in ("accel", "brake"):
-        if getattr(safety, name) > likely.accel:
-            notes.append(
-                f"{name} = {getattr(safety, name):g} m/s^2 is more than what the scenario gives a card, "
-                f"{likely.accel:g} m/s^2: distances to stop come out too short, unless the drones are as quick"
+                f"{name} = {getattr(safety, name):g} {what} than what the scenario gives a card, {usual:g} "
+                f"{what.split()[0]}: distances to stop come out too short, unless the drones are as quick"
             )
     return notes
 

@@ -18,7 +18,6 @@ from airflock.drones import (
     ChannelReport,
     DroneStatus,
     FlightCard,
-    MissionPhase,
     PacketReceiver,
     PacketSigner,
     Peer,
@@ -244,14 +243,3 @@ class FleetObserver:
         if len(known) == len(self.card.members):
             return "all drones"
         return f"drone{'s' * (len(known) > 1)} {', '.join(map(str, known))}"
-
-
-def is_on_ground(phase: MissionPhase) -> bool:
-    """Return True if a drone in this phase has not started, or has landed."""
-    return phase in (
-        MissionPhase.BOOT,
-        MissionPhase.READY,
-        MissionPhase.CLEARED,
-        MissionPhase.ARMING,
-        MissionPhase.DONE,
-    )

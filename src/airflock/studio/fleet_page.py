@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.drones import HEARD_WITHIN, MissionPhase, Peer
-from airflock.fleets import INJECTED_KINDS, FleetObserver, is_on_ground, scenario_fault_name
+from airflock.drones import HEARD_WITHIN, STANDING_PHASES, MissionPhase, Peer
+from airflock.fleets import INJECTED_KINDS, FleetObserver, scenario_fault_name
 from airflock.parts import FAULTS
 from airflock.studio import page_measures as measures
 from airflock.studio.browser_view import BrowserView, Trails
@@ -252,7 +252,7 @@ class FleetScene:
     def _agent_colours(self, now: float, velocity: NDArray[np.float32], position: NDArray[np.float32]) -> AgentColours:
         peers, card, way = [self.observer.peers[member] for member in self.members], self.observer.card, self.colouring
         if way == "phase":
-            values = [-1 if is_on_ground(peer.phase) else AIR_PHASES.index(peer.phase) for peer in peers]
+            values = [-1 if peer.phase in STANDING_PHASES else AIR_PHASES.index(peer.phase) for peer in peers]
             names = tuple(phase.name.lower() for phase in AIR_PHASES)
             return AgentColours(
                 way, agent_colours.CATEGORIES, np.array(values), names=names, note="on the ground, or silent"

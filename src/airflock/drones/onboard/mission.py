@@ -32,23 +32,20 @@ class MissionPhase(IntEnum):
     FAULT = 13
 
 
-FLYING_PHASES = frozenset(
-    {
-        MissionPhase.TAKEOFF,
-        MissionPhase.GATHER,
-        MissionPhase.FLOCK,
-        MissionPhase.GOTO,
-        MissionPhase.HOLD,
-        MissionPhase.RETURN,
-    }
-)
-FLOCKING_PHASES = frozenset({MissionPhase.FLOCK, MissionPhase.GOTO})
-AIRBORNE_PHASES = FLYING_PHASES | {MissionPhase.LAND, MissionPhase.MANUAL}
+def _phases(*phases: MissionPhase) -> frozenset[MissionPhase]:
+    return frozenset(phases)
+
+
+_P = MissionPhase
+PREFLIGHT_PHASES = _phases(_P.BOOT, _P.READY, _P.CLEARED)
+STANDING_PHASES = PREFLIGHT_PHASES | {_P.ARMING, _P.DONE}
+FLOCKING_PHASES = _phases(_P.FLOCK, _P.GOTO)
+PHASES_BEFORE_RETURN = FLOCKING_PHASES | {_P.TAKEOFF, _P.GATHER}
+FLYING_PHASES = PHASES_BEFORE_RETURN | {_P.HOLD, _P.RETURN}
+AIRBORNE_PHASES = FLYING_PHASES | {_P.LAND, _P.MANUAL}
 # A lost neighbour that said so stands, so its reach grows half as fast: four of forty fleets with
 # one wrong clock came below 3 m at full speed, none so.
-NOT_FLOCKING_PHASES = frozenset(
-    {MissionPhase.HOLD, MissionPhase.RETURN, MissionPhase.MANUAL}
-)  # they do not fly with the flock
+NOT_FLOCKING_PHASES = _phases(_P.HOLD, _P.RETURN, _P.MANUAL)  # they do not fly with the flock
 
 
 class MissionFacts(NamedTuple):
@@ -132,15 +129,9 @@ class MissionStep(NamedTuple):
     effects: frozenset[str]
 
 
-def _phases(*phases: MissionPhase) -> frozenset[MissionPhase]:
-    return frozenset(phases)
-
-
 LANDED_TIME = 1.0  # s; a drone that is on the ground for longer does not fly, whatever its phase says
 HIGH_LANDED_TIME = 5.0  # s; our choice: the same where its height says that it flies; it may stand on a roof
 SILENT_RETURN_TIME = 10.0  # s; our choice: without SYS_STATUS nobody knows how long it can still fly
-_P = MissionPhase
-PHASES_BEFORE_RETURN = _phases(_P.TAKEOFF, _P.GATHER, _P.FLOCK, _P.GOTO)
 
 # The first row that holds wins, so the order is the priority; each row can be fired alone in a test
 # and read by a safety officer.

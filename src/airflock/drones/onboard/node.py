@@ -6,7 +6,6 @@ sent. The same inputs give the same outputs to the bit, so that a log can be flo
 
 import re
 from collections import deque
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from airflock.core import State
@@ -22,7 +21,15 @@ from airflock.drones.mavlink.messages import (
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketReceiver, PacketSigner
 from airflock.drones.onboard.card import FlightCard
-from airflock.drones.onboard.mission import FLYING_PHASES, NOT_FLOCKING_PHASES, MissionFacts, MissionPhase, next_step
+from airflock.drones.onboard.mission import (
+    FLYING_PHASES,
+    NOT_FLOCKING_PHASES,
+    PREFLIGHT_PHASES,
+    STANDING_PHASES,
+    MissionFacts,
+    MissionPhase,
+    next_step,
+)
 from airflock.drones.onboard.peers import ORDER_REFUSALS, AutopilotLink, OperatorOrders, Peers
 from airflock.drones.onboard.situation import ConditionTimers, explain_clock_offset, mission_facts
 from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseVelocity, SteeringInput, Velocity
@@ -30,16 +37,6 @@ from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseV
 ORIGIN_MESSAGE = 49
 POSITION_MESSAGES = (32, 33)
 UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, the largest value of a packet
-
-
-def requests(
-    commands: AutopilotCommands, link: AutopilotLink, parameters: Iterable[str], streams: Iterable[int]
-) -> list[bytes]:
-    """Return requests to the autopilot for these parameters, for the origin if it is not known, and these streams."""
-    messages = [commands.request_parameter(name) for name in parameters]
-    if link.origin is None:
-        messages.append(commands.request_message(ORIGIN_MESSAGE))
-    return messages + commands.request_streams(streams)
 
 
 def own_status(
@@ -68,8 +65,6 @@ QUANTITY = re.compile(r"[-+]?\d+(\.\d+)? (?=Hz|m|km|s|V|%)")
 RETRY_PERIOD = 1.0  # s between two tries of a command
 STOP_SECONDS = 3.0  # s for which the motors must be reported off: a heartbeat may be a second old
 MAX_UNSENT_LINES = 64  # lines for a person that wait for the radio
-PREFLIGHT_PHASES = frozenset({MissionPhase.BOOT, MissionPhase.READY, MissionPhase.CLEARED})
-STANDING_PHASES = PREFLIGHT_PHASES | {MissionPhase.DONE}
 
 
 class NodeMemory(NamedTuple):
@@ -418,7 +413,7 @@ class Node:
             self._stop_since = now
         if self._stop_since is None:
             return
-        is_ours = self.phase in STANDING_PHASES and (mission_facts.in_guided_mode or mission_facts.in_land_mode)
+        is_ours = self.phase in STANDING_PHASES - {MissionPhase.ARMING} and (mission_facts.in_guided_mode or mission_facts.in_land_mode)
         is_over = not mission_facts.armed and now - self._stop_since > STOP_SECONDS
         if is_over or not (kills or is_ours):
             self._stop_since, self.operator.kill_confirmed = None, False  # armed later, it starts another flight
@@ -445,7 +440,10 @@ class Node:
         if now - self._request_at >= RETRY_PERIOD - TIME_TOLERANCE and self.phase != MissionPhase.FAULT:
             streams = dict.fromkeys((*self._overdue, *(POSITION_MESSAGES if mission_facts.bad_streams else ())))
             parameters = self.autopilot_link.unknown_parameters() if self.phase in PREFLIGHT_PHASES else []
-            messages = requests(self._speaker, self.autopilot_link, parameters, streams)
+            messages = [self._speaker.request_parameter(name) for name in parameters]
+            if self.autopilot_link.origin is None:
+                messages.append(self._speaker.request_message(ORIGIN_MESSAGE))
+            messages += self._speaker.request_streams(streams)
             self._request_at = now if messages else self._request_at
             out.autopilot.extend(messages)
         due = [k for k, at in enumerate(self._next_status) if now >= at - TIME_TOLERANCE]

@@ -63,7 +63,9 @@ def open_port(text: str) -> Port:
     kind, _, rest = text.partition(":")
     try:
         if kind == "udp":
-            return UdpPort(_place(rest, text))
+            here, there = _addresses(rest, text)
+            # The look-up happens once, before the first packet, to fail early.
+            return UdpPort(UdpAddresses(here, there and (socket.gethostbyname(there[0]), there[1])))
         if kind == "serial":
             return SerialPort(rest, text)
     except OSError as error:
@@ -77,21 +79,15 @@ def check_port(text: str) -> None:
     """Check the text of a port before it is opened; raise LinkError, one line, where it is invalid."""
     kind, _, rest = text.partition(":")
     if kind == "udp":
-        here, _, there = rest.partition(">")
-        for address in (here, there) if there else (here,):
-            _address(address, text)
+        _addresses(rest, text)
     elif kind != "serial":
         raise LinkError(f"{text}: {PORT_FORMS}")
 
 
-def _place(rest: str, text: str) -> UdpAddresses:
+def _addresses(rest: str, text: str) -> UdpAddresses:
+    """Return the two addresses in the text of a port; names are not looked up."""
     here, _, there = rest.partition(">")
-    return UdpAddresses(_address(here, text), _resolved(*_address(there, text)) if there else None)
-
-
-def _resolved(host: str, port: int) -> tuple[str, int]:
-    """Return the numeric address of a name. The look-up happens once, before the first packet, to fail early."""
-    return socket.gethostbyname(host), port
+    return UdpAddresses(_address(here, text), _address(there, text) if there else None)
 
 
 def _address(address: str, text: str) -> tuple[str, int]:

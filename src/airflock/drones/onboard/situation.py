@@ -234,9 +234,12 @@ def mission_facts(
     # Members that return or land are not waited for, or the last one would hold for ever.
     expected = min(s.peers_least, len([peer for peer in flying.values() if peer.phase not in LEAVING_PHASES]))
     position_bad = timers("position", not now - link.state_at <= s.stale or not alive, now)
-    gnss_bad = timers("gnss", _is_gnss_bad(card, link, now), now)
+    is_gnss_bad = link.fix_type < 3 or link.horizontal_accuracy > s.h_acc or link.is_position_doubtful(now)
+    gnss_bad = timers("gnss", is_gnss_bad, now)
     few = timers("few", peers.heard(now) < expected, now)
-    clock_bad = timers("clock", _is_clock_bad(card, link, peers), now)
+    # It differs from the autopilot's, or from those of all peers.
+    is_clock_bad = abs(link.unexplained_offset or 0.0) > s.clock_error or peers.is_own_clock_suspect()
+    clock_bad = timers("clock", is_clock_bad, now)
     out = own is not None and phase in FLYING_PHASES and card.outside(*own[:3]) > 0.0
     near = own is not None and _is_anybody_near(own, fresh.values(), s.near)
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
@@ -313,18 +316,6 @@ def mission_facts(
         reasons_to_hold=tuple(reason for reason, holds in reasons_to_hold.items() if holds),
         at_home=own is not None and home is not None and _is_at_home(card, own, home, layer),
     )
-
-
-def _is_gnss_bad(card: FlightCard, wire: AutopilotLink, now: float) -> bool:
-    """Return True if the own position is unreliable: no fix, inaccurate, a jump, or two sources that disagree."""
-    s = card.safety
-    return wire.fix_type < 3 or wire.horizontal_accuracy > s.h_acc or wire.is_position_doubtful(now)
-
-
-def _is_clock_bad(card: FlightCard, wire: AutopilotLink, peers: Peers) -> bool:
-    """Return True if the own clock differs from the autopilot's or from those of all peers."""
-    offset = wire.unexplained_offset
-    return (offset is not None and abs(offset) > card.safety.clock_error) or peers.is_own_clock_suspect()
 
 
 def explain_clock_offset(card: FlightCard, link: AutopilotLink, peers: Peers, now: float) -> None:

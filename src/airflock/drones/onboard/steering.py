@@ -82,22 +82,17 @@ PASSING_SHARE = 0.8  # of the distance of two layers: farther above each other, 
 PUSH_GAIN = 1.0  # 1/s; half a spring: a metre too near pushes with a metre per second
 
 
-def climb_rate(own: State, height: float, safety: SafetyLimits) -> float:
-    """Return the vertical velocity towards a height (m)."""
-    return float(clamp(HEIGHT_GAIN * (height - own.z), -safety.climb_max, safety.climb_max))
+def climb_rate(own: State, height: float, safety: SafetyLimits, gain: float = HEIGHT_GAIN) -> float:
+    """Return the vertical velocity towards a height (m) by a gain, 1/s."""
+    return float(clamp(gain * (height - own.z), -safety.climb_max, safety.climb_max))
 
 
-def velocity_to_hover_point(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
-    """Return the velocity that keeps a point of the ground plan while climbing to its height."""
+def velocity_to_hover_point(
+    own: State, point: tuple[float, float, float], safety: SafetyLimits, gain: float = HEIGHT_GAIN
+) -> Velocity:
+    """Return the velocity that keeps a point of the ground plan, and goes to its height by a gain, 1/s."""
     vx, vy, _ = shorten(KEEP_GAIN * (point[0] - own.x), KEEP_GAIN * (point[1] - own.y), 0.0, 1.0)
-    return vx, vy, climb_rate(own, point[2], safety)
-
-
-def velocity_to_stay(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
-    """Return the velocity back to the point where the drone stopped, height included."""
-    dx, dy, dz = point[0] - own.x, point[1] - own.y, point[2] - own.z
-    vx, vy, _ = shorten(KEEP_GAIN * dx, KEEP_GAIN * dy, 0.0, 1.0)
-    return vx, vy, float(clamp(KEEP_GAIN * dz, -safety.climb_max, safety.climb_max))
+    return vx, vy, climb_rate(own, point[2], safety, gain)
 
 
 def velocity_towards(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
@@ -268,7 +263,9 @@ class PhaseVelocity:
             # would swing.
             if self._hold_position is None and norm(*own[3:]) < STANDING_SPEED:
                 self._hold_position = own[:3]
-            return NO_VELOCITY if self._hold_position is None else velocity_to_stay(own, self._hold_position, s)
+            if self._hold_position is None:
+                return NO_VELOCITY
+            return velocity_to_hover_point(own, self._hold_position, s, KEEP_GAIN)
         self._hold_position = None
         if phase in (MissionPhase.TAKEOFF, MissionPhase.GATHER) and at.home is not None:
             return velocity_to_hover_point(own, at.home, s)
