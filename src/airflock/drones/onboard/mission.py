@@ -5,7 +5,7 @@ a target change the commanded velocity, not the phase, and hide nothing below th
 the autopilot outrank everything (row 1).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -40,7 +40,8 @@ _P = MissionPhase
 PREFLIGHT_PHASES = _phases(_P.BOOT, _P.READY, _P.CLEARED)
 STANDING_PHASES = PREFLIGHT_PHASES | {_P.ARMING, _P.DONE}
 FLOCKING_PHASES = _phases(_P.FLOCK, _P.GOTO)
-PHASES_BEFORE_RETURN = FLOCKING_PHASES | {_P.TAKEOFF, _P.GATHER}
+FLOWN_AFTER_TAKEOFF = FLOCKING_PHASES | {_P.GATHER}
+PHASES_BEFORE_RETURN = FLOWN_AFTER_TAKEOFF | {_P.TAKEOFF}
 FLYING_PHASES = PHASES_BEFORE_RETURN | {_P.HOLD, _P.RETURN}
 AIRBORNE_PHASES = FLYING_PHASES | {_P.LAND, _P.MANUAL}
 # A lost neighbour that said so stands, so its reach grows half as fast: four of forty fleets with
@@ -115,7 +116,7 @@ class Row(NamedTuple):
     """
 
     number: str
-    phases: frozenset[MissionPhase]
+    phases: Set[MissionPhase]
     event: str
     holds: Callable[[MissionFacts, SafetyLimits], bool]
     next_phase: MissionPhase | None
@@ -154,14 +155,14 @@ MISSION_TABLE: tuple[Row, ...] = (
     ),
     Row(
         "1",
-        _phases(_P.LAND),
+        {_P.LAND},
         "the autopilot neither lands nor follows our commands",
         lambda f, s: f.armed and not f.in_guided_mode and not f.in_land_mode,
         _P.MANUAL,
     ),
     Row(
         "2",
-        _phases(_P.MANUAL),
+        {_P.MANUAL},
         "the operator resumes, and the pilot has selected our mode",
         lambda f, s: (
             f.resume_ordered
@@ -174,8 +175,8 @@ MISSION_TABLE: tuple[Row, ...] = (
         ),
         _P.HOLD,
     ),
-    Row("3", _phases(_P.MANUAL), "disarmed on the ground", lambda f, s: not f.armed and f.has_flown, _P.DONE),
-    Row("3b", _phases(_P.MANUAL), "disarmed before its mission", lambda f, s: not f.armed, _P.READY),
+    Row("3", {_P.MANUAL}, "disarmed on the ground", lambda f, s: not f.armed and f.has_flown, _P.DONE),
+    Row("3b", {_P.MANUAL}, "disarmed before its mission", lambda f, s: not f.armed, _P.READY),
     Row(
         "4",
         FLYING_PHASES | {_P.LAND, _P.ARMING},
@@ -204,9 +205,9 @@ MISSION_TABLE: tuple[Row, ...] = (
     ),
     Row(
         "30b",
-        _phases(_P.HOLD),
+        {_P.HOLD},
         "a stream of the autopilot is silent for too long",
-        lambda f, s: f.silent_streams_for > SILENT_RETURN_TIME and f.has_navigation,
+        lambda f, s: f.silent_streams_for > SILENT_RETURN_TIME,
         _P.RETURN,
     ),
     Row("7", FLYING_PHASES, "the battery is critical", lambda f, s: f.battery_critical, _P.LAND),
@@ -214,23 +215,17 @@ MISSION_TABLE: tuple[Row, ...] = (
         "8",
         FLYING_PHASES - {_P.RETURN},
         "the battery is just enough for the way home",
-        lambda f, s: f.battery_needed_home and f.has_navigation,
+        lambda f, s: f.battery_needed_home,
         _P.RETURN,
     ),
     Row("9b", FLYING_PHASES, "beyond the fence for too long", lambda f, s: f.outside_for > s.outside_land, _P.LAND),
-    Row(
-        "9",
-        FLYING_PHASES - {_P.RETURN},
-        "beyond the fence",
-        lambda f, s: f.outside_for > 0.0 and f.has_navigation,
-        _P.RETURN,
-    ),
+    Row("9", FLYING_PHASES - {_P.RETURN}, "beyond the fence", lambda f, s: f.outside_for > 0.0, _P.RETURN),
     Row("10", FLYING_PHASES, "the limiter turns the velocity along the fence", lambda f, s: f.is_at_fence, None),
     Row(
         "11b",
         FLOCKING_PHASES | {_P.HOLD},
         "nobody has been heard for too long",
-        lambda f, s: f.nobody_heard_for > s.deaf_return and f.has_navigation,
+        lambda f, s: f.nobody_heard_for > s.deaf_return,
         _P.RETURN,
     ),
     Row(
@@ -240,29 +235,17 @@ MISSION_TABLE: tuple[Row, ...] = (
         lambda f, s: f.lost_near,
         None,
     ),
-    Row(
-        "12b",
-        _phases(_P.HOLD),
-        "too few neighbours for too long",
-        lambda f, s: f.few_heard_for > s.peers_return and f.has_navigation,
-        _P.RETURN,
-    ),
+    Row("12b", {_P.HOLD}, "too few neighbours for too long", lambda f, s: f.few_heard_for > s.peers_return, _P.RETURN),
     Row(
         "12", FLOCKING_PHASES | {_P.GATHER}, "too few neighbours", lambda f, s: f.few_heard_for > s.peers_hold, _P.HOLD
     ),
-    Row(
-        "13b",
-        _phases(_P.HOLD),
-        "a suspicious clock for too long",
-        lambda f, s: f.clock_bad_for > s.clock_return and f.has_navigation,
-        _P.RETURN,
-    ),
+    Row("13b", {_P.HOLD}, "a suspicious clock for too long", lambda f, s: f.clock_bad_for > s.clock_return, _P.RETURN),
     Row("13", PHASES_BEFORE_RETURN, "a suspicious clock", lambda f, s: f.clock_bad_for > 0.0, _P.HOLD),
     Row(
         "14b",
         FLYING_PHASES - {_P.RETURN},
         "the operator is lost, and the card says return",
-        lambda f, s: f.operator_lost and s.operator_lost == "return" and f.has_navigation,
+        lambda f, s: f.operator_lost and s.operator_lost == "return",
         _P.RETURN,
     ),
     Row(
@@ -276,69 +259,55 @@ MISSION_TABLE: tuple[Row, ...] = (
         "15b",
         FLYING_PHASES - {_P.RETURN},
         "overloaded too often",
-        lambda f, s: f.overload_count >= s.overloads and not f.is_overloaded and f.has_navigation,
+        lambda f, s: f.overload_count >= s.overloads and not f.is_overloaded,
         _P.RETURN,
     ),
     Row("15", FLYING_PHASES - {_P.HOLD}, "overloaded, or the law failed", lambda f, s: f.is_overloaded, _P.HOLD),
-    Row(
-        "28", _phases(_P.BOOT), "started in the air", lambda f, s: f.present and f.armed and not f.is_landed, _P.MANUAL
-    ),
+    Row("28", {_P.BOOT}, "started in the air", lambda f, s: f.present and f.armed and not f.is_landed, _P.MANUAL),
     # A phase of the ground would hide it from the others.
     Row(
         "28b",
-        _phases(_P.READY, _P.CLEARED, _P.DONE),
+        {_P.READY, _P.CLEARED, _P.DONE},
         "somebody else flies it",
         lambda f, s: f.armed and f.is_airborne and not f.kill_confirmed,
         _P.MANUAL,
     ),
     Row(
         "28b",
-        _phases(_P.ARMING),
+        {_P.ARMING},
         "somebody else flies it",
         lambda f, s: f.armed and f.is_airborne and not f.in_guided_mode,
         _P.MANUAL,
     ),
-    Row("16b", _phases(_P.BOOT, _P.READY, _P.CLEARED), "something can never fit", lambda f, s: bool(f.fault), _P.FAULT),
+    Row("16b", {_P.BOOT, _P.READY, _P.CLEARED}, "something can never fit", lambda f, s: bool(f.fault), _P.FAULT),
     Row(
         "16",
-        _phases(_P.BOOT),
+        {_P.BOOT},
         "card, key and autopilot are there",
         lambda f, s: f.present and (not f.armed or f.is_landed),
         _P.READY,
     ),
-    Row("17", _phases(_P.READY), "nothing is missing", lambda f, s: not f.missing and not f.armed, _P.CLEARED),
-    Row("17b", _phases(_P.CLEARED), "something is missing", lambda f, s: bool(f.missing) or f.armed, _P.READY),
-    Row("18", _phases(_P.CLEARED), "the operator's start is due", lambda f, s: f.due, _P.ARMING),
-    Row(
-        "19d",
-        _phases(_P.ARMING),
-        "a reason to hold, before it took off",
-        lambda f, s: f.calm_for == 0.0,
-        _P.READY,
-    ),
-    Row("19c", _phases(_P.ARMING), "the start is called off", lambda f, s: f.order in CALL_OFF_ORDERS, _P.READY),
+    Row("17", {_P.READY}, "nothing is missing", lambda f, s: not f.missing and not f.armed, _P.CLEARED),
+    Row("17b", {_P.CLEARED}, "something is missing", lambda f, s: bool(f.missing) or f.armed, _P.READY),
+    Row("18", {_P.CLEARED}, "the operator's start is due", lambda f, s: f.due, _P.ARMING),
+    Row("19d", {_P.ARMING}, "a reason to hold, before it took off", lambda f, s: f.calm_for == 0.0, _P.READY),
+    Row("19c", {_P.ARMING}, "the start is called off", lambda f, s: f.order in CALL_OFF_ORDERS, _P.READY),
     Row(
         "19",
-        _phases(_P.ARMING),
+        {_P.ARMING},
         "armed in our mode",
         lambda f, s: f.armed and f.in_guided_mode and f.setpoints_for >= s.stream,
         _P.TAKEOFF,
     ),
-    Row("19b", _phases(_P.ARMING), "not armed in time", lambda f, s: f.phase_for > s.arm_time, _P.READY),
-    Row("20", _phases(_P.TAKEOFF), "on the own layer", lambda f, s: f.at_layer and not f.is_landed, _P.GATHER),
-    Row(
-        "21b",
-        _phases(_P.TAKEOFF),
-        "does not climb",
-        lambda f, s: f.phase_for > s.climb_time and not f.is_climbing,
-        _P.LAND,
-    ),
-    Row("21", _phases(_P.TAKEOFF), "a neighbour is near", lambda f, s: f.neighbour_near, _P.HOLD),
+    Row("19b", {_P.ARMING}, "not armed in time", lambda f, s: f.phase_for > s.arm_time, _P.READY),
+    Row("20", {_P.TAKEOFF}, "on the own layer", lambda f, s: f.at_layer, _P.GATHER),
+    Row("21b", {_P.TAKEOFF}, "does not climb", lambda f, s: f.phase_for > s.climb_time and not f.is_climbing, _P.LAND),
+    Row("21", {_P.TAKEOFF}, "a neighbour is near", lambda f, s: f.neighbour_near, _P.HOLD),
     Row(
         "22",
-        _phases(_P.GATHER),
+        {_P.GATHER},
         "all are gathered, or the operator says go",
-        lambda f, s: (f.have_gathered or f.order == OrderKind.GO) and f.is_high and not f.is_landed,
+        lambda f, s: (f.have_gathered or f.order == OrderKind.GO) and f.is_high,
         _P.FLOCK,
     ),
     Row("23", FLYING_PHASES, "ordered to land", lambda f, s: f.order == OrderKind.LAND, _P.LAND),
@@ -346,7 +315,7 @@ MISSION_TABLE: tuple[Row, ...] = (
         "23",
         FLYING_PHASES - {_P.RETURN},
         "ordered to return, or the time is up",
-        lambda f, s: (f.order == OrderKind.RETURN or f.time_over) and f.has_navigation,
+        lambda f, s: f.order == OrderKind.RETURN or f.time_over,
         _P.RETURN,
     ),
     Row("23", FLYING_PHASES - {_P.HOLD}, "ordered to hold", lambda f, s: f.order == OrderKind.HOLD, _P.HOLD),
@@ -359,31 +328,20 @@ MISSION_TABLE: tuple[Row, ...] = (
             and not f.needs_resume
             and f.has_good_navigation
             and f.is_high
-            and not f.is_landed
             and f.phase_before_hold != _P.TAKEOFF
         ),
         _P.GOTO,
     ),
-    Row(
-        "23",
-        _phases(_P.GOTO),
-        "ordered to flock on",
-        lambda f, s: f.order == OrderKind.RESUME and not f.is_landed,
-        _P.FLOCK,
-    ),
+    Row("23", {_P.GOTO}, "ordered to flock on", lambda f, s: f.order == OrderKind.RESUME, _P.FLOCK),
     Row("24", FLOCKING_PHASES, "a member joins", lambda f, s: f.member_joined, None),
     Row(
-        "25",
-        _phases(_P.HOLD),
-        "all is well again",
-        lambda f, s: f.calm_for >= s.calm and not f.held and not f.is_landed,
-        None,
+        "25", {_P.HOLD}, "all is well again", lambda f, s: f.calm_for >= s.calm and not f.held and not f.is_landed, None
     ),
-    Row("26", _phases(_P.RETURN), "above home", lambda f, s: f.at_home, _P.LAND),
-    Row("27b", _phases(_P.LAND), "it never left the ground", lambda f, s: not (f.armed or f.has_flown), _P.READY),
+    Row("26", {_P.RETURN}, "above home", lambda f, s: f.at_home, _P.LAND),
+    Row("27b", {_P.LAND}, "it never left the ground", lambda f, s: not (f.armed or f.has_flown), _P.READY),
     Row(
         "27",
-        _phases(_P.LAND),
+        {_P.LAND},
         "landed",
         lambda f, s: not f.armed or (f.landed_for > LANDED_TIME and f.in_land_mode and f.has_flown and not f.is_high),
         _P.DONE,
@@ -399,9 +357,10 @@ def next_step(phase: MissionPhase, facts: MissionFacts, safety: SafetyLimits) ->
     for row in ROWS_OF_PHASE[phase]:
         if not row.holds(facts, safety):
             continue
-        if row is CALM_ROW:
-            return MissionStep(row, facts.phase_before_hold, frozenset(effects))
-        if row.next_phase is not None:
-            return MissionStep(row, row.next_phase, frozenset(effects))
-        effects.add(row.number)
+        to = facts.phase_before_hold if row is CALM_ROW else row.next_phase
+        if to is None:
+            effects.add(row.number)
+        # Nobody flies home without knowing its place, nor goes on to flock while it stands on the ground.
+        elif facts.has_navigation if to == _P.RETURN else not (facts.is_landed and to in FLOWN_AFTER_TAKEOFF):
+            return MissionStep(row, to, frozenset(effects))
     return MissionStep(None, phase, frozenset(effects))

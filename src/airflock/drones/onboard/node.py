@@ -413,7 +413,9 @@ class Node:
             self._stop_since = now
         if self._stop_since is None:
             return
-        is_ours = self.phase in STANDING_PHASES - {MissionPhase.ARMING} and (mission_facts.in_guided_mode or mission_facts.in_land_mode)
+        is_ours = self.phase in STANDING_PHASES - {MissionPhase.ARMING} and (
+            mission_facts.in_guided_mode or mission_facts.in_land_mode
+        )
         is_over = not mission_facts.armed and now - self._stop_since > STOP_SECONDS
         if is_over or not (kills or is_ours):
             self._stop_since, self.operator.kill_confirmed = None, False  # armed later, it starts another flight
