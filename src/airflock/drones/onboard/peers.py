@@ -272,32 +272,22 @@ class AutopilotLink:
 
     def __init__(self, autopilot: Autopilot, member: int, site: FlightSite):
         self._autopilot, self._member, self._site, self._stream = autopilot, member, site, FrameStream()
-        self.state: State | None = None
-        self.state_at = self.heartbeat_at = self.global_at = -1e9
-        self.global_state: State | None = None
-        self.origin: tuple[float, float, float] | None = None
+        self.heartbeat_at = self.jumped_at = -1e9
         self.kind: int | None = None
         self.mode: int | None = None
         self.armed: bool | None = None
-        self.is_landed: bool | None = None
-        self.fix_type, self.horizontal_accuracy = 0, 1e9
-        self.battery: float | None = None
         self.in_failsafe = self.prearm_fails = False
         self.battery_warning = ""
         self.lines: list[str] = []
         self.reported_lines: deque[str] = deque(maxlen=REPORTED_LINES)
-        self._pieces, self.explained_offset = TextPieces(), 0.0
-        self.jumped_at = -1e9
+        self._pieces = TextPieces()
         self.accepted: set[int] = set()
-        self.parameters: dict[str, float] = {}
-        self.clock_offsets: list[float] = []
         self.other_systems: set[int] = set()
-        self.arrivals: dict[int, float] = {}
-        self.restarts = self.refused = 0
-        self._state_times: deque[float] = deque(maxlen=32)
-        self.far = 0.0
-        self._max_jump = 5.0
-        self._boot_ms, self._may_reboot_silently, self._is_reboot_assumed = 0, True, False
+        self.refused = 0
+        self.far, self._max_jump = 0.0, 5.0
+        self._may_reboot_silently, self._is_reboot_assumed = True, False
+        self.restarts = -1
+        self._forget(0)
 
     def __call__(self, data: bytes, now: float, utc: int, max_jump: float) -> None:
         """Take bytes at now (s) and utc (µs of Unix time); max_jump: largest plausible step (m)."""
@@ -366,11 +356,18 @@ class AutopilotLink:
     def _forget(self, boot_ms: int) -> None:
         """Forget what an autopilot may have changed by a reboot, at a time since its boot (ms)."""
         self.restarts += 1
-        self._boot_ms, self.state, self.state_at = boot_ms, None, -1e9
-        self.global_state, self.global_at, self.origin, self.is_landed = None, -1e9, None, None
-        self.fix_type, self.horizontal_accuracy, self.battery = 0, 1e9, None
-        self.parameters, self.clock_offsets, self.explained_offset, self.arrivals = {}, [], 0.0, {}
-        self._state_times.clear()
+        self._boot_ms, self.state_at, self.global_at = boot_ms, -1e9, -1e9
+        self.state: State | None = None
+        self.global_state: State | None = None
+        self.origin: tuple[float, float, float] | None = None
+        self.is_landed: bool | None = None
+        self.fix_type, self.horizontal_accuracy = 0, 1e9
+        self.battery: float | None = None
+        self.parameters: dict[str, float] = {}
+        self.clock_offsets: list[float] = []
+        self.explained_offset = 0.0
+        self.arrivals: dict[int, float] = {}
+        self._state_times: deque[float] = deque(maxlen=32)
 
     def _heartbeat(self, v: dict[str, Any], now: float, utc: int) -> bool:
         self.kind, self.mode, self.armed = v["autopilot"], v["custom_mode"], bool(v["base_mode"] & ARMED_FLAG)
