@@ -138,16 +138,17 @@ def read_public_key(text: Any, errors: list[str]) -> bytes:
     return key
 
 
-OWN_CHOICE = "our choice"
-GRAVITY = 9.80665  # m/s²
+def ours(default: float, unit: str, **more: Any) -> Any:
+    """Return a quantity whose default nobody but us has chosen."""
+    return quantity(default, unit, source="our choice", **more)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SafetyLimits(Record):
     """Limits of the velocity, and thresholds at which a mission is interrupted or ended."""
 
-    speed_max: float = quantity(6.0, "m/s", low=0.1, high=60.0, source=OWN_CHOICE, meaning="largest commanded speed")
-    climb_max: float = quantity(2.0, "m/s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="largest vertical speed")
+    speed_max: float = ours(6.0, "m/s", low=0.1, high=60.0, meaning="largest commanded speed")
+    climb_max: float = ours(2.0, "m/s", low=0.1, high=10.0, meaning="largest vertical speed")
     accel: float = quantity(
         6.0, "m/s^2", low=0.1, high=50.0, source="Vásárhelyi et al. 2018, Table S5",
         meaning="a command differs from the own velocity by at most accel (delay + response + tick)",
@@ -159,89 +160,52 @@ class SafetyLimits(Record):
         0.0, "s", low=0.0, high=10.0, source="Vásárhelyi et al. 2018 have none",
         meaning="dead time of the drone, for which it flies on before it answers a command",
     )  # fmt: skip
-    brake: float = quantity(
-        2.5, "m/s^2", low=0.1, high=20.0, source=OWN_CHOICE, meaning="deceleration of the braking curve at the fence"
+    brake: float = ours(2.5, "m/s^2", low=0.1, high=20.0, meaning="deceleration of the braking curve at the fence")
+    brake_gain: float = ours(1.0, "1/s", low=0.05, high=10.0, meaning="its gain near the fence")
+    soft_margin: float = ours(
+        3.0, "m", low=0.0, high=1000.0, meaning="distance from the fence at which outward speed is 0"
     )
-    brake_gain: float = quantity(1.0, "1/s", low=0.05, high=10.0, source=OWN_CHOICE, meaning="its gain near the fence")
-    soft_margin: float = quantity(
-        3.0, "m", low=0.0, high=1000.0, source=OWN_CHOICE, meaning="distance from the fence at which outward speed is 0"
+    base: float = ours(10.0, "m", low=2.0, high=500.0, meaning="height of the lowest layer")
+    uneven: float = ours(
+        5.0, "m", low=0.5, high=500.0, meaning="largest height of a drone on the ground above or below the site"
     )
-    base: float = quantity(10.0, "m", low=2.0, high=500.0, source=OWN_CHOICE, meaning="height of the lowest layer")
-    uneven: float = quantity(
-        5.0, "m", low=0.5, high=500.0, source=OWN_CHOICE,
-        meaning="largest height of a drone on the ground above or below the site",
-    )  # fmt: skip
-    layer: float = quantity(3.0, "m", low=0.5, high=50.0, source=OWN_CHOICE, meaning="distance of two layers")
-    start_step: float = quantity(2.0, "s", low=0.0, high=60.0, source=OWN_CHOICE, meaning="from one start to the next")
-    start_apart: float = quantity(
-        3.0, "m", low=0.5, high=100.0, source=OWN_CHOICE, meaning="smallest distance on the ground"
+    layer: float = ours(3.0, "m", low=0.5, high=50.0, meaning="distance of two layers")
+    start_step: float = ours(2.0, "s", low=0.0, high=60.0, meaning="from one start to the next")
+    start_apart: float = ours(3.0, "m", low=0.5, high=100.0, meaning="smallest distance on the ground")
+    home_radius: float = ours(2.0, "m", low=0.5, high=50.0, meaning="within this distance: above home")
+    gather: float = ours(200.0, "m", low=1.0, high=5000.0, meaning="farthest a member may be to flock")
+    yield_range: float = ours(
+        8.0, "m", low=0.5, high=100.0, meaning="on the way home, neighbours nearer than this repel"
     )
-    home_radius: float = quantity(
-        2.0, "m", low=0.5, high=50.0, source=OWN_CHOICE, meaning="within this distance: above home"
-    )
-    gather: float = quantity(
-        200.0, "m", low=1.0, high=5000.0, source=OWN_CHOICE, meaning="farthest a member may be to flock"
-    )
-    yield_range: float = quantity(
-        8.0, "m", low=0.5, high=100.0, source=OWN_CHOICE, meaning="on the way home, neighbours nearer than this repel"
-    )
-    near: float = quantity(
-        2.0, "m", low=0.1, high=50.0, source=OWN_CHOICE, meaning="a take-off waits for a neighbour within"
-    )
+    near: float = ours(2.0, "m", low=0.1, high=50.0, meaning="a take-off waits for a neighbour within")
     stream: float = quantity(1.5, "s", low=1.0, high=10.0, source="PX4: more than 1 s", meaning="setpoints before use")
-    arm_time: float = quantity(
-        10.0, "s", low=2.0, high=120.0, source=OWN_CHOICE, meaning="for arming, before it gives up"
-    )
-    climb_time: float = quantity(5.0, "s", low=1.0, high=60.0, source=OWN_CHOICE, meaning="to begin climbing")
-    stale: float = quantity(0.5, "s", low=0.1, high=5.0, source=OWN_CHOICE, meaning="age of the own position: hold")
-    stale_land: float = quantity(5.0, "s", low=0.5, high=60.0, source=OWN_CHOICE, meaning="without a position: land")
-    h_acc: float = quantity(3.0, "m", low=0.1, high=100.0, source=OWN_CHOICE, meaning="worst accuracy of a position")
-    jump: float = quantity(
-        5.0, "m", low=0.5, high=100.0, source=OWN_CHOICE, meaning="largest plausible jump of a position"
-    )
-    gnss_land: float = quantity(10.0, "s", low=1.0, high=120.0, source=OWN_CHOICE, meaning="with bad navigation: land")
-    battery_low: float = quantity(
-        25.0, "%", low=0.0, high=100.0, source=OWN_CHOICE, meaning="left when home is reached"
-    )
-    battery_critical: float = quantity(12.0, "%", low=0.0, high=100.0, source=OWN_CHOICE, meaning="land here")
-    battery_way: float = quantity(
-        10.0, "%/km", low=0.0, high=1000.0, source=OWN_CHOICE, meaning="what the way home takes"
-    )
-    outside_land: float = quantity(10.0, "s", low=1.0, high=300.0, source=OWN_CHOICE, meaning="beyond the fence: land")
-    peers_least: float = quantity(1.0, "1", low=0.0, high=250.0, source=OWN_CHOICE, meaning="neighbours to be heard")
-    peers_hold: float = quantity(10.0, "s", low=1.0, high=600.0, source=OWN_CHOICE, meaning="with fewer: hold")
-    peers_return: float = quantity(30.0, "s", low=2.0, high=600.0, source=OWN_CHOICE, meaning="with fewer: return")
-    deaf_return: float = quantity(
-        20.0, "s", low=2.0, high=600.0, source=OWN_CHOICE, meaning="with nobody heard: return"
-    )
-    clock_error: float = quantity(
-        0.2, "s", low=0.01, high=5.0, source=OWN_CHOICE, meaning="suspicious error of a clock"
-    )
-    clock_return: float = quantity(
-        10.0, "s", low=1.0, high=300.0, source=OWN_CHOICE, meaning="with a bad clock: return"
-    )
-    clock_spread: float = quantity(
-        1.0, "s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="stamps farther off than this are refused"
-    )
-    late: float = quantity(1.0, "s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="a tick this late is an overload")
-    overloads: float = quantity(
-        3.0, "1", low=1.0, high=100.0, source=OWN_CHOICE, meaning="overloads after which it returns"
-    )
-    calm: float = quantity(3.0, "s", low=0.5, high=60.0, source=OWN_CHOICE, meaning="all well for this long: go on")
-    operator_time: float = quantity(
-        10.0, "s", low=1.0, high=3600.0, source=OWN_CHOICE, meaning="silence that counts as lost"
-    )
+    arm_time: float = ours(10.0, "s", low=2.0, high=120.0, meaning="for arming, before it gives up")
+    climb_time: float = ours(5.0, "s", low=1.0, high=60.0, meaning="to begin climbing")
+    stale: float = ours(0.5, "s", low=0.1, high=5.0, meaning="age of the own position: hold")
+    stale_land: float = ours(5.0, "s", low=0.5, high=60.0, meaning="without a position: land")
+    h_acc: float = ours(3.0, "m", low=0.1, high=100.0, meaning="worst accuracy of a position")
+    jump: float = ours(5.0, "m", low=0.5, high=100.0, meaning="largest plausible jump of a position")
+    gnss_land: float = ours(10.0, "s", low=1.0, high=120.0, meaning="with bad navigation: land")
+    battery_low: float = ours(25.0, "%", low=0.0, high=100.0, meaning="left when home is reached")
+    battery_critical: float = ours(12.0, "%", low=0.0, high=100.0, meaning="land here")
+    battery_way: float = ours(10.0, "%/km", low=0.0, high=1000.0, meaning="what the way home takes")
+    outside_land: float = ours(10.0, "s", low=1.0, high=300.0, meaning="beyond the fence: land")
+    peers_least: float = ours(1.0, "1", low=0.0, high=250.0, meaning="neighbours to be heard")
+    peers_hold: float = ours(10.0, "s", low=1.0, high=600.0, meaning="with fewer: hold")
+    peers_return: float = ours(30.0, "s", low=2.0, high=600.0, meaning="with fewer: return")
+    deaf_return: float = ours(20.0, "s", low=2.0, high=600.0, meaning="with nobody heard: return")
+    clock_error: float = ours(0.2, "s", low=0.01, high=5.0, meaning="suspicious error of a clock")
+    clock_return: float = ours(10.0, "s", low=1.0, high=300.0, meaning="with a bad clock: return")
+    clock_spread: float = ours(1.0, "s", low=0.1, high=10.0, meaning="stamps farther off than this are refused")
+    late: float = ours(1.0, "s", low=0.1, high=10.0, meaning="a tick this late is an overload")
+    overloads: float = ours(3.0, "1", low=1.0, high=100.0, meaning="overloads after which it returns")
+    calm: float = ours(3.0, "s", low=0.5, high=60.0, meaning="all well for this long: go on")
+    operator_time: float = ours(10.0, "s", low=1.0, high=3600.0, meaning="silence that counts as lost")
     operator_lost: str = choice("ignore", ("ignore", "hold", "return"), meaning="what to do without the operator")
-    mission_time: float = quantity(
-        600.0, "s", low=1.0, high=36000.0, source=OWN_CHOICE, meaning="in the air, then return"
-    )
-    status_period: float = quantity(
-        0.1, "s", low=0.02, high=5.0, source=OWN_CHOICE, meaning="between packets, fast radio"
-    )
-    slow_period: float = quantity(
-        1.0, "s", low=0.1, high=60.0, source=OWN_CHOICE, meaning="between packets, slow radio"
-    )
-    tick: float = quantity(0.05, "s", low=0.01, high=0.2, source=OWN_CHOICE, meaning="between setpoints")
+    mission_time: float = ours(600.0, "s", low=1.0, high=36000.0, meaning="in the air, then return")
+    status_period: float = ours(0.1, "s", low=0.02, high=5.0, meaning="between packets, fast radio")
+    slow_period: float = ours(1.0, "s", low=0.1, high=60.0, meaning="between packets, slow radio")
+    tick: float = ours(0.05, "s", low=0.01, high=0.2, meaning="between setpoints")
 
 
 FenceSide = tuple[float, float, float, float]
@@ -367,6 +331,7 @@ HEARING_KEYS = (
 NUMBER_RANGES = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
+GRAVITY = 9.80665  # m/s²
 MAX_RAMP = 0.3  # of the relaxation time, in which an acceleration is there; our choice: 20 m/s³ for 6 m/s² and 1 s
 MAX_SYSTEM_ID = 250  # system ids above are left to ground stations
 
