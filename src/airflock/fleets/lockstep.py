@@ -216,7 +216,7 @@ class FlownFleet:
 
     def __init__(self, scenario: Scenario, card: FlightCard, seed: int, faults: Sequence[InjectedFault]):
         self.scenario, self.card, self.seed, self.faults = scenario, card, seed, tuple(faults)
-        self.frames: list[list[Sequence[float]]] = []
+        self.frames: list[Sequence[Sequence[float]]] = []
         self.state_times: list[list[list[float]]] = []
         self.log: list[tuple[float, int, str]] = []
 

@@ -286,7 +286,7 @@ class AutopilotLink:
         self.refused = 0
         self.far, self._max_jump = 0.0, 5.0
         self._may_reboot_silently, self._is_reboot_assumed = True, False
-        self.restarts = -1
+        self.restarts, self._boot_ms = -1, 0
         self._forget(0)
 
     def __call__(self, data: bytes, now: float, utc: int, max_jump: float) -> None:
@@ -356,7 +356,8 @@ class AutopilotLink:
     def _forget(self, boot_ms: int) -> None:
         """Forget what an autopilot may have changed by a reboot, at a time since its boot (ms)."""
         self.restarts += 1
-        self._boot_ms, self.state_at, self.global_at = boot_ms, -1e9, -1e9
+        self._boot_ms = boot_ms
+        self.state_at = self.global_at = -1e9
         self.state: State | None = None
         self.global_state: State | None = None
         self.origin: tuple[float, float, float] | None = None
