@@ -633,10 +633,15 @@ def pairs_of_columns(rng, truth):
 @question
 def pairs_of_columns_by_letters(rng, tmp_path):
     names, table = pairs_of_columns(rng, Truth(rng, count=3))
-    words = (
-        f"has 3 keypoints ({', '.join(names)}); choose one: --keypoint {names[0]}; or if each is an individual"
-    )
+    words = f"has 3 keypoints ({', '.join(names)}); choose one: --keypoint {names[0]}; or if each is an individual"
     return csv(tmp_path, table), {}, words
+
+
+@question
+def pairs_of_columns_in_several_units(rng, tmp_path):
+    names, table = pairs_of_columns(rng, Truth(rng, count=3))
+    table = table.rename(columns={f"{names[2]}_x_m": f"{names[2]}_x_cm"})
+    return csv(tmp_path, table), {"map": {"id": "columns"}}, f"column {names[2]}_x_cm: its unit is not that of others"
 
 
 @kind

@@ -103,21 +103,17 @@ def _is_heading(values: Any) -> bool:
     return False
 
 
-def _step(values: Any, axis: int) -> float:
-    """Return the median step along an axis; 0 where there is none."""
-    step = np.abs(np.diff(values.astype(float), axis=axis))
+def _step(values: Any, axis: int, order: int = 1) -> float:
+    """Return the median step along an axis, or the change of steps; 0 where there is none."""
+    step = np.abs(np.diff(values.astype(float), order, axis))
     return float(np.median(step[np.isfinite(step)])) if np.isfinite(step).any() else 0.0
 
 
 def _roughness(values: Any, axis: int) -> float:
     """Return by how much steps along an axis change, relative to the steps: little along time, if it is one."""
-    if values.shape[axis] < 3:
+    if not np.isfinite(np.diff(values.astype(float), 2, axis)).any():
         return math.inf
-    step = np.diff(values.astype(float), axis=axis)
-    turn = np.diff(step, axis=axis)
-    if not np.isfinite(turn).any():
-        return math.inf
-    return float(np.nanmedian(np.abs(turn)) / (np.nanmedian(np.abs(step)) + 1e-300))
+    return _step(values, axis, 2) / (_step(values, axis) + 1e-300)
 
 
 def _numbers(array: Any, where: str) -> Any:
@@ -287,15 +283,13 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
     if axes not in (["x", "y"], ["x", "y", "z"]):
         raise RecordingError(f"{where}: space has the axes {', '.join(axes)}, not x, y or x, y, z")
     errors: list[str] = []
-    seconds, scale = np.empty(0), np.nan
+    seconds, scale, tracks = np.empty(0), np.nan, []
     with collect_errors(errors):
         seconds = _seconds(found, options, where)
     with collect_errors(errors):
         scale = table_columns.unit_in_metres(str(found["position"].attrs.get("units", "")), where, "position", options)
     if errors:
         raise RecordingError("\n".join(errors))
-    rows = np.arange(len(seconds))
-    tracks = []
     # Variables of unknown unit are ignored rather than guessed; velocities are then differentiated
     # from positions.
     for number, name in enumerate(found["individual"].values):
@@ -309,7 +303,7 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
                     continue  # of unknown unit (frames, pixels) or no velocity: differentiated instead
                 values = own[variable].transpose("time", "space").values.astype(float) * table_columns.SPEED_UNITS[unit]
                 columns |= {names[c]: values[:, c] for c in range(len(axes))}
-        track = ImportedTrack(str(name), where, seconds, columns, rows)
+        track = ImportedTrack(str(name), where, seconds, columns, np.arange(len(seconds)))
         # Airflock's own confidence says which frames were bridged, and no likelihood.
         if "confidence" in own and not str(found.attrs.get("source_software", "")).startswith("airflock"):
             track.flags = {"confidence": (table_columns.LIKELY, own["confidence"].values.astype(float))}

@@ -164,12 +164,9 @@ def _move(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
     assert track.origin is not None
     if track.origin == origin:
         return
-    for names, change in (
-        (POSITION_TARGETS, points_to_origin),
-        (VELOCITY_TARGETS, vectors_to_origin),
-        (COMMAND_TARGETS, vectors_to_origin),
-    ):
+    for names in (POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS):
         if track.has(names):
+            change = points_to_origin if names is POSITION_TARGETS else vectors_to_origin
             moved = change(track.stack(names, 3), track.origin, origin)
             track.columns |= {name: moved[:, c] for c, name in enumerate(names) if name in track.columns}
     track.origin = origin

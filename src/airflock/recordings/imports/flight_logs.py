@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airflock.drones import AIRBORNE_PHASES, FLYING_PHASES, read_log_ticks
 from airflock.recordings.imports import reader
 from airflock.recordings.imports.common_frame import on_other_clock
-from airflock.recordings.imports.table_columns import invalid_note, px4_origin
+from airflock.recordings.imports.table_columns import VALID, invalid_note, px4_origin
 from airflock.recordings.imports.track import (
     COMMAND_TARGETS,
     POSITION_TARGETS,
@@ -61,9 +61,7 @@ def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
     columns = _enu({axis: local[axis] for axis in NED[0]}, POSITION_TARGETS) | _enu(
         {a: local[a] for a in NED[1]}, VELOCITY_TARGETS
     )
-    valid = np.ones(len(time), bool)
-    for flag in ("xy_valid", "v_xy_valid"):
-        valid &= local[flag].astype(bool) if flag in local else True
+    valid = np.logical_and.reduce([time >= 0.0, *(local[flag].astype(bool) for flag in VALID if flag in local)])
     labels = {"x": "y", "y": "x", "z": "-z", "vx": "vy", "vy": "vx", "vz": "-vz"}
     found = _track(path.stem, path, time, columns, np.arange(len(time)), user_labels=labels)
     _add_commands(found, *_setpoints(topics.get(SETPOINT)), findings, f"{SETPOINT} (velocities)")
@@ -111,9 +109,8 @@ def _air(topic: Any, time: Any) -> Any:
     return ~topic["landed"].astype(bool)[np.maximum(at, 0)] & (at >= 0)
 
 
-# ArduPilot DataFlash logs (.bin) and telemetry logs (.tlog), by pymavlink (LGPL-3, an extra that is
-# only imported). Fields are read by name, because their sets change between releases. Both are read
-# in a process of its own (`reader_process`): pymavlink loops without end in some damaged logs.
+# Fields of ArduPilot's logs are read by name, because their sets change between releases, in a process of its own
+# (`reader_process`): pymavlink loops without end in some damaged logs.
 PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
 PACE = 1e5  # bytes per second; read by Python, row by row
 VELOCITY_SUBMODE = 4  # GUIP.Type of a velocity; others control a position, an acceleration or an attitude
@@ -206,9 +203,8 @@ def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
     columns = {"x": at(east, 1), "y": north[:, 1], "vx": at(east, 2), "vy": north[:, 2]}
     if down is not None:
         columns |= {"z": -at(down, 1), "vz": -at(down, 2)}
-    columns = {
-        k: columns[k] for k in (*POSITION_TARGETS, *VELOCITY_TARGETS) if k in columns and np.isfinite(columns[k]).any()
-    }
+    known = [k for k in (*POSITION_TARGETS, *VELOCITY_TARGETS) if k in columns and np.isfinite(columns[k]).any()]
+    columns = {name: columns[name] for name in known}
     labels = {"x": "PSCE.PE", "y": "PSCN.PN", "z": "-PSCD.PD", "vx": "PSCE.VE", "vy": "PSCN.VN", "vz": "-PSCD.VD"}
     return _track(path.stem, path, time, columns, np.arange(len(time)), user_labels=labels)
 

@@ -403,40 +403,37 @@ def check_options(
     options: ImportOptions, findings: ImportReport, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
 ) -> None:
     """Refuse options that cannot be meant, all at once. Raises RecordingError."""
-    errors = findings.errors
-    known = {
-        "unit": ("", *table_columns.LENGTH_UNITS, *table_columns.PIXEL_UNITS),
-        "time_unit": ("", *table_columns.TIME_UNITS, "frames", *table_columns.DATE_ORDERS),
-    }
-    for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
+    choices = {
+        "unit": (*table_columns.LENGTH_UNITS, *table_columns.PIXEL_UNITS),
+        "time_unit": (*table_columns.TIME_UNITS, "frames", *table_columns.DATE_ORDERS), "axes": ("enu", "ned"),
+    }  # fmt: skip
+
+    def check(sound: Any, line: str) -> None:
+        findings.errors += [] if sound else [line]
+
+    for name, allowed in {**choices, "decimal": (".", ",")}.items():
         value = getattr(options, name)
-        if not isinstance(value, str) or value not in allowed:
-            errors.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")
-    given = {name: getattr(options, name) for name in ("keypoint", "delimiter")}
-    errors += [f"{name} = {value!r} is no text" for name, value in given.items() if not isinstance(value, str)]
-    if not isinstance(options.map, Mapping):
-        errors.append(f'map = {options.map!r}: give targets with expressions, such as {{"t": "time_us*1e-6"}}')
-    else:
-        said = [(key, text) for key, text in options.map.items() if not isinstance(text, str)]
-        errors += [f"map: {key} = {text!r} is no text; an expression is one" for key, text in said]
+        sound = isinstance(value, str) and (value in allowed or (name in choices and not value))
+        check(sound, f"{name} = {value!r} is none of {', '.join(allowed)}")
+    for name in ("keypoint", "delimiter"):
+        check(isinstance(getattr(options, name), str), f"{name} = {getattr(options, name)!r} is no text")
+    line = f'map = {options.map!r}: give targets with expressions, such as {{"t": "time_us*1e-6"}}'
+    check(isinstance(options.map, Mapping), line)
+    for key, text in options.map.items() if isinstance(options.map, Mapping) else ():
+        check(isinstance(text, str), f"map: {key} = {text!r} is no text; an expression is one")
     for name, number in {"scale": options.scale, "fps": options.fps, "rate": numbers["rate"]}.items():
-        if number is not None and not (is_number(number) and 0.0 < number < 1e9):
-            errors.append(f"{name} = {_shown(number)} must be a number above 0")
-    if not (is_number(numbers["bridge"]) and 0.0 <= numbers["bridge"] < 1e9):
-        errors.append(f"bridge = {_shown(numbers['bridge'])} s must be a number, 0 or more")
+        sound = number is None or (is_number(number) and 0.0 < number < 1e9)
+        check(sound, f"{name} = {_shown(number)} must be a number above 0")
+    bridge = numbers["bridge"]
+    check(is_number(bridge) and 0.0 <= bridge < 1e9, f"bridge = {_shown(bridge)} s must be a number, 0 or more")
     for name in ("begin", "end"):
-        if numbers[name] is not None and not (is_number(numbers[name]) and np.isfinite(numbers[name])):
-            errors.append(f"{name} = {_shown(numbers[name])} is not a time in s")
-    if not is_number(precision) or precision not in (32, 64):
-        errors.append(f"precision = {precision} is none of 32, 64")
-    if origin is not None and not _is_origin(origin):
-        errors.append(f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m")
-    kinds = [accept] if isinstance(accept, str) or not isinstance(accept, Iterable) else list(accept)
-    errors += [
-        f"accept = {kind} is none of {', '.join(ACCEPTABLE_ERRORS)}"
-        for kind in kinds
-        if str(kind) not in ACCEPTABLE_ERRORS
-    ]
+        sound = numbers[name] is None or (is_number(numbers[name]) and np.isfinite(numbers[name]))
+        check(sound, f"{name} = {_shown(numbers[name])} is not a time in s")
+    check(is_number(precision) and precision in (32, 64), f"precision = {precision} is none of 32, 64")
+    line = f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m"
+    check(origin is None or _is_origin(origin), line)
+    for kind in [accept] if isinstance(accept, str) or not isinstance(accept, Iterable) else accept:
+        check(str(kind) in ACCEPTABLE_ERRORS, f"accept = {kind} is none of {', '.join(ACCEPTABLE_ERRORS)}")
     findings.raise_errors()
 
 

@@ -135,7 +135,10 @@ def tracks_from_parts(
         wide = _of_keypoint(pose, where, options)
     elif not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS)):
         wide = wide_columns(names, where, stem, options)
-    how = column_layout(where, first_individual_columns(names, wide) if wide else names, options)
+    headers = long_names(wide, where)
+    grouped = [*wide.values(), *(column_groups(names).values() if wide else ())]
+    taken = {column for parts in grouped for column in parts.values()}
+    how = column_layout(where, [*(name for name in names if name not in taken), *headers.values()], options)
     findings.notes += how.notes
     _choose_id(where, how, parts, findings)
     if "id" not in options.map:
@@ -147,7 +150,7 @@ def tracks_from_parts(
     # memory.
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
-        for name, piece in split_by_individual(part, wide, how, stem):
+        for name, piece in split_by_individual(part, wide, headers, stem):
             read = [c for c in how.used if c not in (how.id, how.date, *how.flags)]
             numbers = {c: _numbers(piece, c, how, at, options) for c in read}
             values = how.values(numbers, len(piece)) | {
@@ -376,16 +379,14 @@ def _choose_id(where: str, how: ColumnLayout, parts: Any, findings: ImportReport
 
 def _ask_for_receivers(where: str, how: ColumnLayout, parts: Any) -> None:
     """Raise RecordingError if a column that is not read may part receivers, or individuals, at the same times."""
-    columns = [column for column in how.unread if DEVICES.search(column) and column != how.id]
+    columns, names = [c for c in how.unread if DEVICES.search(c)], [how.id] if how.id else []
     clock = [name for name in how.times if name][:1]
-    _, part = (
-        next(parts([*columns, *clock, *([how.id] if how.id else [])]), (0, None)) if columns and clock else (0, None)
-    )
-    for column in columns if part is not None else ():
-        own = part.dropna(subset=[column, *clock]).groupby([*([how.id] if how.id else []), column])[clock[0]]
+    for column in columns if clock else ():
+        _, part = next(parts([column, *clock, *names]), (0, pd.DataFrame(columns=[column, *clock, *names])))
+        own = part.dropna(subset=[column, *clock]).groupby([*names, column])[clock[0]]
         spans = own.agg(["min", "max", "size"])
         spans = spans[spans["size"] > 2].sort_values("min")
-        for _, each in spans.groupby(level=0) if how.id else [("", spans)]:
+        for _, each in spans.groupby(level=0) if names else [("", spans)]:
             if (each["min"].iloc[1:].to_numpy() < each["max"].iloc[:-1].to_numpy()).any():
                 raise RecordingError(
                     f"{where}: column {column} has {len(each)} names at the same times: write --map receiver:={column} "
@@ -681,25 +682,29 @@ def _of_keypoint(pose: PoseColumns, where: str, options: ImportOptions, other: s
     return {individual: parts[chosen] for individual, parts in pose.items() if chosen in parts}
 
 
-def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) -> list[str]:
-    """Return the columns of the first individual of a wide table, by the names of a long one."""
-    grouped = [*wide.values(), *column_groups(names).values()]
-    taken, first = {column for parts in grouped for column in parts.values()}, next(iter(wide.values()))
-    unit = {part: table_columns.split_header(column)[1] for part, column in first.items()}
-    return [n for n in names if n not in taken] + [f"{part} [{unit[part]}]" if unit[part] else part for part in first]
+def long_names(wide: dict[str, dict[str, str]], where: str) -> dict[str, str]:
+    """Return component → header of a long table of the same; raise RecordingError where units differ."""
+    headers: dict[str, str] = {}
+    for parts in wide.values():
+        for part, column in parts.items():
+            unit = table_columns.split_header(column)[1]
+            header = headers.setdefault(part, f"{part} [{unit}]" if unit else part)
+            if table_columns.split_header(header)[1] != unit:
+                raise RecordingError(
+                    f"{where}: column {column}: its unit is not that of others, {header}; write all in one"
+                )
+    return headers
 
 
 def split_by_individual(
-    table: pd.DataFrame, wide: dict[str, dict[str, str]], layout: ColumnLayout, stem: str
+    table: pd.DataFrame, wide: dict[str, dict[str, str]], headers: dict[str, str], stem: str
 ) -> Iterable[tuple[str, pd.DataFrame]]:
     """Yield the rows of each individual by the names of a long table; all rows as `stem` if the table is not wide."""
     if not wide:
         return [(stem, table)]
-    taken = [column for parts in wide.values() for column in parts.values()]
-    rest = table.drop(columns=taken)
-    axes = {layout.labels[axis]: axis for axis in POSITION_TARGETS if axis in layout.labels}
-    axes |= {part: part for part in next(iter(wide.values())) if part not in POSITION_TARGETS}  # such as a likelihood
+    rest = table.drop(columns=[column for parts in wide.values() for column in parts.values()])
+    empty = pd.Series(np.nan, table.index)
     return (
-        (number, rest.assign(**{label: table[parts[axis]] for label, axis in axes.items() if axis in parts}))
-        for number, parts in wide.items()
+        (name, rest.assign(**{header: table.get(parts.get(part), empty) for part, header in headers.items()}))
+        for name, parts in wide.items()
     )

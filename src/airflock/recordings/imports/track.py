@@ -31,18 +31,9 @@ def ignore_progress(_: float) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """Options of the user for files that do not contain this themselves.
+    """Options of the user for files that do not contain this themselves, as in `load_tracks`.
 
-    map        : target (t, x, vx, cx, id, lat, ...) → expression of column names
-    unit       : of lengths: m, cm, mm, km, ft, or px with `scale`
-    scale      : metres per pixel
-    time_unit  : s, ms, us, ns, min, or frames with `fps`
-    fps        : frames per second
-    keypoint   : which one, where a file has several
-    axes       : enu (x east, y north, z up) or ned (x north, y east, z down) of files that leave it open; if empty,
-                 enu, but ned of tables with the fields of PX4
-    decimal, delimiter : of text files; an empty delimiter is found out
-    done       : called with the share of a file that has been read, 0-1
+    used : names of those that a reader made use of; those of no use are refused
     """
 
     map: Mapping[str, str] = field(default_factory=dict)
@@ -55,7 +46,7 @@ class ImportOptions:
     decimal: str = "."
     delimiter: str = ""
     done: Callable[[float], None] = ignore_progress
-    used: set[str] = field(default_factory=set)  # options that a reader made use of; those of no use are refused
+    used: set[str] = field(default_factory=set)
 
     def use(self, name: str) -> Any:
         """Return an option, and note that it was of use."""

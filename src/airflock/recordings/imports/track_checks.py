@@ -28,10 +28,10 @@ from airflock.recordings.imports.track import (
 from airflock.support import RecordingError
 
 Array = NDArray[np.float64]
+SPEED_TARGETS = (*VELOCITY_TARGETS, *COMMAND_TARGETS)
 PLACE_TARGETS = (*POSITION_TARGETS[:2], *GEODETIC_TARGETS[:2])
-MissingRows = dict[
-    str, list[tuple[NDArray[np.int64], int]]
-]  # column → of each individual the rows, and how many are inf
+# column → of each individual the rows, and how many are inf
+MissingRows = dict[str, list[tuple[NDArray[np.int64], int]]]
 
 
 def drop_rejected_rows(tracks: list[ImportedTrack], findings: ImportReport) -> list[ImportedTrack]:
@@ -118,13 +118,13 @@ def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) ->
     # By file: a thousand individuals with the same gap give one note.
     for source, own in tracks_by_source(tracks).items():
         _drop_null_islands(source, own, findings)
-        whole = [_timed(track) & _placed(track) for track in own]
+        whole = [np.isfinite(track.time) & _placed(track) for track in own]
         there = [track for track, sound in zip(own, whole, strict=True) if sound.any()]
         if not there:
             raise RecordingError(f"{source}: no row has both a time and a position")
         gone = [track.name for track, sound in zip(own, whole, strict=True) if not sound.any()]
         findings.notes += [f"{source}: {name}: has no position at any time: left out" for name in gone]
-        late = [track.rows[_placed(track) & ~_timed(track)] for track in there]
+        late = [track.rows[_placed(track) & ~np.isfinite(track.time)] for track in there]
         _tell(findings, source, {"": [(rows, 0) for rows in late]}, "without a time left out")
         _tell(findings, source, _lacking(there, PLACE_TARGETS), "without a number taken as absent")
         for track, sound in zip(own, whole, strict=True):
@@ -152,16 +152,14 @@ def _drop_null_islands(source: str, own: list[ImportedTrack], findings: ImportRe
 def note_missing_velocities(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Note where a velocity or a command is nan or inf; an infinite one becomes nan."""
     for source, own in tracks_by_source(tracks).items():
-        _tell(
-            findings, source, _lacking(own, VELOCITY_TARGETS), "without a number: differentiated from positions there"
-        )
-        endless = _lacking(own, COMMAND_TARGETS)
-        endless = {name: found for name, found in endless.items() if any(count for _, count in found)}
+        way = "without a number: differentiated from positions there"
+        _tell(findings, source, _lacking(own, VELOCITY_TARGETS), way)
+        every = _lacking(own, COMMAND_TARGETS).items()
+        endless = {name: found for name, found in every if any(count for _, count in found)}
         _tell(findings, source, endless, "without a number: no command there")
     for track in tracks:
-        for name in (*VELOCITY_TARGETS, *COMMAND_TARGETS):
-            if name in track.columns and np.isinf(track.columns[name]).any():
-                track.columns[name] = np.where(np.isinf(track.columns[name]), np.nan, track.columns[name])
+        speeds = {name: track.columns[name] for name in SPEED_TARGETS if name in track.columns}
+        track.columns |= {k: np.where(np.isinf(v), np.nan, v) for k, v in speeds.items() if np.isinf(v).any()}
 
 
 def tracks_by_source(tracks: Iterable[ImportedTrack]) -> dict[str, list[ImportedTrack]]:
@@ -172,16 +170,9 @@ def tracks_by_source(tracks: Iterable[ImportedTrack]) -> dict[str, list[Imported
     return found
 
 
-def _timed(track: ImportedTrack) -> NDArray[np.bool_]:
-    return np.isfinite(track.time)
-
-
 def _placed(track: ImportedTrack) -> NDArray[np.bool_]:
-    found = np.ones(len(track.time), bool)
-    for name in PLACE_TARGETS:
-        if name in track.columns:
-            found &= np.isfinite(track.columns[name])
-    return found
+    places = [np.isfinite(track.columns[name]) for name in PLACE_TARGETS if name in track.columns]
+    return np.logical_and.reduce(places)
 
 
 def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
@@ -189,9 +180,8 @@ def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
     found: MissingRows = {}
     for track in tracks:
         for name in names:
-            values = track.columns.get(name)
-            if values is not None:
-                bad = ~np.isfinite(values) & _timed(track)
+            if (values := track.columns.get(name)) is not None:
+                bad = ~np.isfinite(values) & np.isfinite(track.time)
                 found.setdefault(track.label(name), []).append((track.rows[bad], int(np.isinf(values[bad]).sum())))
     return found
 
@@ -230,27 +220,16 @@ def median_period(track: ImportedTrack) -> float:
 def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Rule 1: sort by time, and report repeated instants and impossible steps, each once a file."""
     for source, own in tracks_by_source(tracks).items():
-        late = [_sorted(track) for track in own]
-        _tell_order(source, [rows for rows in late if rows.size], findings)
+        late = [track.rows[1:][np.diff(track.time) < 0.0] for track in own]
+        for track in (track for track, rows in zip(own, late, strict=True) if rows.size):
+            track.keep(np.argsort(track.time, kind="stable"))
+        if count := sum(map(len, late)):
+            first = min(int(rows[0]) for rows in late if rows.size)
+            findings.notes.append(f"{source}: {count} rows out of order (first row {first}): sorted")
         _repeated(source, own, findings)
         wrong = [line for line in map(_wrong_step, own) if line]
         if wrong:
             findings.add_error(wrong[0], "time")
-
-
-def _sorted(track: ImportedTrack) -> NDArray[np.int64]:
-    """Sort a track by time; return the rows that came before an earlier one."""
-    late = np.flatnonzero(np.diff(track.time) < 0.0) + 1
-    rows = track.rows[late]
-    if late.size:
-        track.keep(np.argsort(track.time, kind="stable"))
-    return rows
-
-
-def _tell_order(source: str, late: list[NDArray[np.int64]], findings: ImportReport) -> None:
-    if late:
-        count, first = sum(len(rows) for rows in late), min(int(rows[0]) for rows in late)
-        findings.notes.append(f"{source}: {count} rows out of order (first row {first}): sorted")
 
 
 def _wrong_step(track: ImportedTrack) -> str:
@@ -304,19 +283,16 @@ def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     known: dict[str, ImportedTrack] = {}
     for track in tracks:
         if track.name in known:
-            way = "rename one, or give each a folder" if _is_of_file(track) else "write --map id:=file, or rename"
+            own = track.name == Path(track.source).stem
+            way = "rename one, or give each a folder" if own else "write --map id:=file, or rename"
             findings.add_error(f"{track.source}: {track.name} is also in {known[track.name].source}; {way}")
         known.setdefault(track.name, track)
-
-
-def _is_of_file(track: ImportedTrack) -> bool:
-    return track.name == Path(track.source).stem
 
 
 def _name_by_folder(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Name individuals by the nearest folders that differ, where their files have one name, as logs of ArduPilot do."""
     count = Counter(track.name for track in tracks)
-    same = [track for track in tracks if count[track.name] > 1 and _is_of_file(track)]
+    same = [track for track in tracks if count[track.name] > 1 and track.name == Path(track.source).stem]
     taken = {track.name for track in tracks} - {track.name for track in same}
     for folders in zip(*(reversed(Path(track.source).absolute().parts[:-1]) for track in same), strict=False):
         if len({*folders} - taken) == len(same):
@@ -331,7 +307,7 @@ def _name_by_folder(tracks: list[ImportedTrack], findings: ImportReport) -> None
 def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Drop columns without any number, and rows without a height that other rows have."""
     for track in tracks:
-        for name in (*VELOCITY_TARGETS, *COMMAND_TARGETS):
+        for name in SPEED_TARGETS:
             if name in track.columns and not np.isfinite(track.columns[name]).any():
                 del track.columns[name]
     for name in ("z", "alt"):
@@ -349,10 +325,9 @@ def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
                     f'or put all at one height: --map "{name}:=0"'
                 )
             elif not known.all():
-                row, count = track.rows[np.flatnonzero(~known)[0]], int((~known).sum())
-                findings.notes.append(
-                    f"{where}: {count} rows of {track.name} without a height left out, first row {row}"
-                )
+                out = track.rows[~known]
+                line = f"{where}: {len(out)} rows of {track.name} without a height left out, first row {out[0]}"
+                findings.notes.append(line)
                 track.keep(known)
 
 
@@ -481,28 +456,19 @@ def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64]
     return place[rows + k] - place[rows], path[rows + k] - path[rows]
 
 
-class AxisCorrelation(NamedTuple):
-    """Correlation of displacements (rows) with velocities (columns), by axis.
+def _likeness(moved: Array, summed: Array) -> tuple[NDArray[np.bool_], Array, Array]:
+    """Correlate displacements with the same from velocities, both (pair, axis), m; some velocity must vary.
 
-    lively : (axis,) whether the motion along it varies enough to compare, and more than the noise of the positions
-    r      : (axis, axis) correlation
-    slopes : (axis,) by how many times the displacement along it changes as the velocity says
+    Returns (axis,) whether the motion along it varies enough to compare, and more than the noise of the positions;
+    (axis, axis) correlation; (axis,) by how many times the displacement along it changes as the velocity says.
     """
-
-    lively: NDArray[np.bool_]
-    r: Array
-    slopes: Array
-
-
-def _likeness(moved: Array, summed: Array) -> AxisCorrelation:
-    """Correlate displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
     strength, spread = summed.std(axis=0), moved.std(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
         r, slopes = np.nan_to_num(cross / np.outer(spread, strength)), np.diag(cross) / strength**2
     # What no velocity explains is noise: below it a drone that stands shows no unit and no axis.
     noise = spread * np.sqrt(np.clip(1.0 - np.abs(r).max(axis=1) ** 2, 0.0, 1.0))
-    return AxisCorrelation((strength > 0.05 * strength.max()) & (spread > noise.max()), r, slopes)
+    return (strength > 0.05 * strength.max()) & (spread > noise.max()), r, slopes
 
 
 def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, findings: ImportReport) -> None:
@@ -523,13 +489,12 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
                 "axes",
             )
         return
-    likeness = _likeness(moved, summed)
-    lively, r, slopes = likeness
-    swapped = _swap_error(source, track, likeness)
+    lively, r, slopes = _likeness(moved, summed)
+    axes, best = range(len(slopes)), np.abs(r).argmax(axis=1)
+    swapped = [i for i in axes if lively[i] and i != best[i] and abs(r[i, i]) < 0.5 and abs(r[i, best[i]]) > 0.8]
     if swapped:
-        findings.add_error(swapped, "axes")
+        findings.add_error(_swap_error(track, swapped[0], int(best[swapped[0]]), r), "axes")
         return
-    axes = range(len(slopes))
     # Climbs are slow beside flight along the ground, but where they agree with the heights but for the sign it shows.
     turned = [i for i in axes if r[i, i] < (-0.5 if lively[i] else -0.9)]
     for i in turned:
@@ -561,20 +526,21 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
             findings.add_error(f"{line}: {reason or 'units differ'}", "axes")
 
 
-def _swap_error(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
-    """Return the error of the first axis of positions that goes with another axis of velocities; empty if there is
-    none.
-    """
-    for i, row in enumerate(likeness.r):
-        j = int(np.abs(row).argmax())
-        if likeness.lively[i] and i != j and abs(row[i]) < 0.5 and abs(row[j]) > 0.8:
-            return (
-                f"{source}: column {track.label(POSITION_TARGETS[i])} ({POSITION_TARGETS[i]}), "
-                f"row {track.rows[0]} on: moves like "
-                f"{track.label(VELOCITY_TARGETS[j])} ({VELOCITY_TARGETS[j]}; r = {row[j]:.2f}): "
-                f"{_unswapped(track, i, j)}"
-            )
-    return ""
+def _swap_error(track: ImportedTrack, i: int, j: int, r: Array) -> str:
+    """Return the error of axis i of the positions that goes with axis j of the velocities."""
+    axes, labels = ([names[k] for k in (i, j)] for names in (POSITION_TARGETS, [*map(track.label, POSITION_TARGETS)]))
+    speed, own = VELOCITY_TARGETS[j], [quote_column(label) for label in labels]
+    line = (
+        f"{track.source}: column {labels[0]} ({axes[0]}), row {track.rows[0]} on: moves like {track.label(speed)} "
+        f"({speed}; r = {r[i, j]:.2f}): "
+    )
+    meanings = [header_meaning(label) for label in labels]
+    if [meaning and meaning.target for meaning in meanings] == axes[::-1]:
+        # They have been exchanged already, by --axes or --map.
+        line += "positions and velocities have different axes; write, without --axes, "
+        return f'{line}--map "{axes[0]}:={own[0]}" --map "{axes[1]}:={own[1]}"'
+    line += "swapped, or north-east-down; write "
+    return f'{line}--map "{axes[0]}:={own[1]}" --map "{axes[1]}:={own[0]}", or --axes ned'
 
 
 def _scale_reason(track: ImportedTrack, slope: float, axes: list[int]) -> str:
@@ -583,33 +549,9 @@ def _scale_reason(track: ImportedTrack, slope: float, axes: list[int]) -> str:
     if abs(np.log(near / slope)) >= 0.1:
         return ""
     words, changes = REASONS[near]
-    columns = {"x": POSITION_TARGETS, "vx": VELOCITY_TARGETS}
-    ways = [
-        " ".join(
-            _mapped(track, each, wrong) for each in ([columns[target][i] for i in axes] if target != "t" else ["t"])
-        )
-        for target, wrong in changes
-    ]
+    names = {"t": ["t"], "x": [POSITION_TARGETS[i] for i in axes], "vx": [VELOCITY_TARGETS[i] for i in axes]}
+    ways = [" ".join(_mapped(track, each, wrong) for each in names[target]) for target, wrong in changes]
     return f"{words}: write {', or '.join(ways)}"
-
-
-def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
-    """Return the remedy where axis i of the positions is axis j of the velocities."""
-    own = [quote_column(track.label(POSITION_TARGETS[k])) for k in (i, j)]
-    meanings = [header_meaning(track.label(POSITION_TARGETS[k])) for k in (i, j)]
-    if [None if one is None else one.target for one in meanings] == [
-        POSITION_TARGETS[j],
-        POSITION_TARGETS[i],
-    ]:  # they have been exchanged already, by --axes or --map
-        return (
-            "positions and velocities have different axes; write, without --axes, "
-            f'--map "{POSITION_TARGETS[i]}:={own[0]}" --map "{POSITION_TARGETS[j]}:={own[1]}"'
-        )
-    return (
-        f'swapped, or north-east-down; write --map "{POSITION_TARGETS[i]}:={own[1]}" '
-        f'--map "{POSITION_TARGETS[j]}:={own[0]}", '
-        "or --axes ned"
-    )
 
 
 def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
