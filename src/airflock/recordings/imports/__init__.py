@@ -17,7 +17,9 @@ from importlib.metadata import entry_points
 from importlib.util import find_spec
 from inspect import cleandoc
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
+
+T = TypeVar("T", bound=Callable[..., Any])
 
 SNIFFED = 4096  # bytes of a file that a sniffer gets
 
@@ -35,15 +37,14 @@ class Format(NamedTuple):
     module: str
     function: str
 
-    def load(self) -> Callable[..., Any]:
-        """Import the reader."""
-        read: Callable[..., Any] = getattr(import_module(self.module), self.function)
-        return read
+    def load(self) -> Any:
+        """Import the reader; its `sniff` is that of its decorator."""
+        return getattr(import_module(self.module), self.function)
 
 
 def reader(
     name: str, *, suffixes: tuple[str, ...], sniff: Callable[[bytes], bool] | None = None, needs: str = ""
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+) -> Callable[[T], T]:
     """Declare a reader of files; all but `sniff` is written literally, since it is read without running the file.
 
     name     : of the format; suffixes : endings of its files, in small letters
@@ -51,7 +52,7 @@ def reader(
     needs    : packages beside those of Airflock, with their licences
     """
 
-    def declare(read: Callable[..., Any]) -> Callable[..., Any]:
+    def declare(read: T) -> T:
         read.sniff = sniff  # type: ignore[attr-defined]
         return read
 

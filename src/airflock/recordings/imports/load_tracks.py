@@ -473,4 +473,5 @@ def _reader_of(path: Path) -> Callable[..., Any]:
     if not fit:
         why = f"is no {own[0].name}, of which it has the ending" if own else f"{ending or 'no ending'}: unknown format"
         raise RecordingError(f"{path}: {why}; known: {format_words()}")
-    return fit[0]
+    read: Callable[..., Any] = fit[0]
+    return read

@@ -172,7 +172,8 @@ def tracks_by_source(tracks: Iterable[ImportedTrack]) -> dict[str, list[Imported
 
 def _placed(track: ImportedTrack) -> NDArray[np.bool_]:
     places = [np.isfinite(track.columns[name]) for name in PLACE_TARGETS if name in track.columns]
-    return np.logical_and.reduce(places)
+    found: NDArray[np.bool_] = np.logical_and.reduce(places)
+    return found
 
 
 def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
