@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 import airflock
 from airflock.cli.main import app
+from airflock.core import installed
 from airflock.recordings import imports
 from airflock.recordings.imports import common_frame
 from airflock.support.errors import RecordingError
@@ -1038,6 +1039,11 @@ def read_diary(path, options, findings):
 """
 
 
+def forget_formats():
+    imports.formats.cache_clear()
+    installed.cache_clear()
+
+
 @pytest.fixture(params=["beside", "package"])
 def diary(request, tmp_path, monkeypatch):
     """A file of a format that one file reads, which lies beside the others or in an installed package."""
@@ -1057,9 +1063,9 @@ def diary(request, tmp_path, monkeypatch):
         monkeypatch.syspath_prepend(folder)
         file, module = folder / "aviary" / "readers" / "diary.py", "aviary.readers.diary"
     file.write_text(READER)
-    imports.formats.cache_clear()
+    forget_formats()
     yield file
-    imports.formats.cache_clear()
+    forget_formats()
     for name in (module, "aviary", "aviary.readers"):
         sys.modules.pop(name, None)
 
@@ -1086,7 +1092,7 @@ def test_a_reader_in_one_file_works_at_once(diary, tmp_path, monkeypatch):
 def test_a_reader_that_cannot_be_read_is_left_out_with_its_name(diary, tmp_path):
     if diary.parent.name == "readers":
         diary.write_text("\n@reader(\n")
-        imports.formats.cache_clear()
+        forget_formats()
         with pytest.warns(UserWarning, match=r"aviary: aviary\.readers: .*diary\.py.* its readers are left out"):
             known = imports.formats()
         assert "PX4 ULog" in {one.name for one in known}

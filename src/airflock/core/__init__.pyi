@@ -20,6 +20,7 @@ from .contract import (
     argument_names as argument_names,
     call_rule as call_rule,
     initial_values as initial_values,
+    installed as installed,
     namespace_names as namespace_names,
 )
 from .fault import (

@@ -13,11 +13,12 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 from inspect import cleandoc
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
+
+from airflock.core import installed
 
 T = TypeVar("T", bound=Callable[..., Any])
 
@@ -65,17 +66,16 @@ def formats() -> list[Format]:
 
     They are read from the text of the files: help names them without importing NumPy.
     """
-    found = list(_declared("airflock", __name__))
-    for point in entry_points(group="airflock.parts"):
-        owner = point.dist.name if point.dist else point.name
+    found = list(_declared(__name__))
+    for owner, top in installed():
         try:
-            found += _declared(owner, f"{point.value}.readers")
+            found += _declared(f"{top}.readers")
         except Exception as error:  # a package of somebody else may fail in any way, and ours must go on
-            warnings.warn(f"{owner}: {point.value}.readers: {error}; its readers are left out", stacklevel=2)
+            warnings.warn(f"{owner}: {top}.readers: {error}; its readers are left out", stacklevel=2)
     return found
 
 
-def _declared(owner: str, package: str) -> Iterator[Format]:
+def _declared(package: str) -> Iterator[Format]:
     """Yield the formats that the files of a package declare; none where there is no such package."""
     try:
         spec = find_spec(package)
