@@ -60,6 +60,8 @@ class _MovedFinder(MetaPathFinder):
                 f"{name}: the modules of airflock.{first} are in airflock.{_MOVED[first]} now; "
                 "public names are those of airflock itself"
             )
+        if package == __name__:
+            raise ModuleNotFoundError(f"{name}: no such module; public names are those of airflock itself", name=name)
 
 
 sys.meta_path.append(_MovedFinder())

@@ -1,6 +1,7 @@
-"""Files that version 0.1 wrote are read, and mean what they meant."""
+"""Files that version 0.1 and commit 66fb6ba3 wrote are read and mean what they meant, or are refused in one line."""
 
 import json
+import shutil
 import tomllib
 
 import pytest
@@ -8,11 +9,16 @@ from mutations import GOLDEN
 
 import airflock
 from airflock.certificates.certificate import certificate_checksum, check_certificate
+from airflock.drones.mavlink.signing import read_key
 from airflock.drones.onboard.card import read_card
+from airflock.drones.onboard.flight_log import replay
+from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.recordings.recording_files import replay_recording
+from airflock.runs.folder import open_folder
 from airflock.search.study import load_study
 from airflock.support.errors import CardError, RecordingError, StudyError
 
+LATER = GOLDEN.parent / "66fb6ba3"  # the last commit before modules moved
 SCORES = json.loads((GOLDEN / "scores.json").read_text())
 
 
@@ -81,3 +87,49 @@ def test_what_is_saved_today_carries_its_format(tmp_path):
     newer.to_netcdf(tmp_path / "c.nc", engine="h5netcdf")
     with pytest.raises(RecordingError, match="is of format 3; this Airflock reads formats 1 to 2"):
         airflock.load_recording(tmp_path / "c.nc")
+
+
+def test_scenario_study_and_optimum_of_66fb6ba3_mean_what_they_meant():
+    scenario = airflock.load(LATER / "mine.toml")
+    assert (scenario.agents, scenario.flight.duration, scenario.radio.numbers.delay) == (4, 8.0, 0.4)
+    assert [(entry.fault.name, entry.at) for entry in scenario.faults] == [("motor", 4.0)]
+    study = load_study(LATER / "study.toml")
+    assert study.space.keys == ("model.p_rep", "model.r0_rep") and study.scenario.document == scenario.document
+    best = airflock.load(LATER / "study_folder" / "best.toml")
+    found = tomllib.loads((LATER / "study_folder" / "result.toml").read_text())
+    assert {key: getattr(best.parameters, key.partition(".")[2]) for key in found["parameters"]} == found["parameters"]
+
+
+def test_a_study_of_66fb6ba3_is_not_mixed_with_flights_of_today(tmp_path, monkeypatch):
+    monkeypatch.chdir(LATER)  # a study holds the name of its scenario
+    folder = shutil.copytree(LATER / "study_folder", tmp_path / "study")
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    line = r"^\S*: holds another study: rules = \w+ there, \w+ now; .*, or continue it with the version that began it$"
+    with pytest.raises(StudyError, match=line):
+        open_folder(folder, load_study("study.toml"), resume=True)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_certificate_of_66fb6ba3_says_with_which_version_it_can_be_checked():
+    document = tomllib.loads((LATER / "certificate.toml").read_text())
+    assert document["seal"] == certificate_checksum(document)
+    with pytest.raises(StudyError, match=r"other rules .*; check it with the version that wrote it, or certify again$"):
+        check_certificate(LATER / "certificate.toml")
+
+
+def test_a_recording_of_66fb6ba3_has_its_scenario_and_its_scores():
+    recording = airflock.load_recording(LATER / "flight.nc")
+    assert scenario_of_recording(recording).document == airflock.load(LATER / "mine.toml").document
+    [found] = airflock.score(recording).to_dict("records")
+    assert found["phi_vel"] == pytest.approx(5.228351219074343, rel=1e-6)
+    assert found["fitness"] == pytest.approx(0.028467499505426302, rel=1e-6)
+
+
+def test_card_and_logs_of_nodes_of_66fb6ba3_are_read(tmp_path):
+    key = shutil.copyfile(LATER / "card.key", tmp_path / "card.key")
+    key.chmod(0o600)  # a key that others can read is refused
+    card, lines = read_card(LATER / "card.json"), (LATER / "node.log").read_text().splitlines()
+    ticks = list(replay(lines, card, read_key(key)))
+    assert len(ticks) == len(lines) - 1 and sum(tick.same for tick in ticks) > 0.9 * len(ticks)
+    tracks = airflock.load_tracks(LATER / "flown.log")
+    assert tracks.sizes["time"] == 60 and bool((tracks["position"].sel(space="z") == 50.0).all())

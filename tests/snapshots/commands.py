@@ -40,7 +40,7 @@ SMALLER = {  # words of a command, and options that make it small; of two values
     r"^airflock tune logs": "--out tuned_by_logs",
     r"^airflock run": "--agents 5 --duration 5 --seeds 2",
     r"^airflock evolve": "--population 4 --generations 2 --agents 5 --duration 5",
-    r"^airflock harden": "--generations 1 --duration 5 --seeds 2",
+    r"^airflock harden": "--duration 5 --seeds 2",
     r"^airflock certify (?!.*--check)": "--agents 5 --duration 5 --budget 5s",
     r"^airflock fleet": "--agents 3 --duration 5",
     r"^airflock sweep": "--agents 4 --duration 5 --seeds 1",

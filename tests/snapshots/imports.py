@@ -1,4 +1,4 @@
-"""Import paths that pages, examples and users' rule files use, and whether each resolves; the public names.
+"""Import paths that pages, examples and users' rule files use: whether each resolves, or in which line it ends.
 
 The list of paths is the record: pages may change, and what they once showed must still work. Where there is no record,
 the paths are collected from the tree (delete `imports.json` and write it anew to collect them again).
@@ -152,11 +152,24 @@ def _value(path: str) -> Any:
     return None
 
 
+def _error(path: str) -> str:
+    """Return the line in which the import of a path ends, as a person sees it first."""
+    words = path.replace(":", ".").split(".")
+    try:
+        for count in range(2, len(words) + 1):
+            import_module(".".join(words[:count]))
+    except ModuleNotFoundError as error:
+        return str(error)
+    return ""
+
+
 def take() -> dict[str, Any]:
-    """Return the public names, and of each path where it was used and whether it resolves."""
+    """Return the public names; of each path where it was used, and whether it resolves or the line in which it ends."""
     if RECORD.exists():
         used = {path: known["where"] for path, known in json.loads(RECORD.read_text(encoding="utf-8"))["paths"].items()}
     else:
         used = collect()
-    paths = {path: {"where": where, "resolves": _value(path) is not None} for path, where in used.items()}
+    paths = {
+        path: {"where": where, "resolves": _value(path) is not None or _error(path)} for path, where in used.items()
+    }
     return {"public": sorted(airflock.__all__), "paths": paths}

@@ -26,6 +26,10 @@ from airflock.view.plot_by_kind import KINDS
         ("run x --sed 3", "run: --sed: unknown option; did you mean --seeds?"),
         ("import x.csv --out y.nc", "import: --out: unknown option; did you mean --save?"),
         ("evolve x --output y", "evolve: --output: unknown option; did you mean --out?"),
+        (
+            "harden x --margin faults",
+            "harden: --margin was removed; give the distance itself: --limit 'r_min<3 at 0.01/h'",
+        ),
         ("run x --zzz", "run: --zzz: unknown option; airflock run --help lists them"),
         ("run vasarhelyi_2018/real_4ms --seeds 0", "run: --seeds 0 lies outside [1, 1000000]"),
         ("run vasarhelyi_2018/real_4ms --seeds=-3", "run: --seeds -3 lies outside [1, 1000000]"),

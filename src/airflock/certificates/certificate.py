@@ -435,7 +435,10 @@ def check_document(
         faults += _sums(document, campaign)
         rules = campaign.document()["rules"]
         if rules != flown["rules"]:
-            raise StudyError(f"{where}: its flights were computed by other rules (text {flown['rules']}, here {rules})")
+            raise StudyError(
+                f"{where}: its flights were computed by other rules (text {flown['rules']}, here {rules}); "
+                "check it with the version that wrote it, or certify again"
+            )
         found, notes = _flown_again(document, campaign, threads, on_done), _differences(flown)
     return CheckReport(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
 

@@ -14,6 +14,14 @@ from airflock.support import INVALID, AirflockError, suggest
 
 OUTPUT_OPTIONS = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
 SIMILARITY_CUTOFF = 0.75  # of options, as in `spelling.suggest`: both begin with --, and --budget is not --quiet
+_EVOLVE_AGAIN = "was removed; airflock evolve with --set metrics.r_coll=M or --set radio.delay=S evolves for more of it"
+REMOVED_OPTIONS = {  # verb, option → what to do instead
+    **dict.fromkeys(
+        [("harden", "--margin"), ("tune", "--margin")],
+        "was removed; give the distance itself: --limit 'r_min<3 at 0.01/h'",
+    ),
+    **dict.fromkeys([("harden", name) for name in ("--delay", "--r-coll", "--generations")], _EVOLVE_AGAIN),
+}
 SEED_OPTION = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
 
 
@@ -49,6 +57,8 @@ def _message(error: Any, context: Any, words: Sequence[str]) -> str:
     kind, message = type(error).__name__, str(getattr(error, "message", "") or error.format_message())
     parameter = getattr(error, "param", None)
     if kind == "NoSuchOption":
+        if instead := REMOVED_OPTIONS.get((_command_path(context).partition(" ")[2], error.option_name)):
+            return f"{error.option_name} {instead}"
         known = [name for one in context.command.params for name in one.opts] if context is not None else []
         same = [name for name in OUTPUT_OPTIONS if name in known and error.option_name in (*OUTPUT_OPTIONS, "--output")]
         hint = (
