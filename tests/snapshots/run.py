@@ -4,7 +4,8 @@
     python tests/snapshots/run.py drivers --show PRESET
 
 Every other module of this folder is one snapshot: its docstring says what it freezes, and `take() -> dict` returns it
-as plain values of JSON. A module may have `show(name) -> str`, which prints one item in full.
+as plain values of JSON. A module may have `show(name) -> str`, which prints one item in full. Where it has
+BY_PROCESSOR = True, last bits depend on the processor, and its record holds a snapshot for each kind that is on record.
 """
 
 import argparse
@@ -55,6 +56,28 @@ def record(name):
     return HERE / f"{name}.json"
 
 
+def processor():
+    """Return the kind of this processor, such as znver4, whatever drivers are compiled for."""
+    from llvmlite.binding import get_host_cpu_name
+
+    return get_host_cpu_name()
+
+
+def recorded(name):
+    """Return what is on record of a snapshot, on this kind of processor; None where that is not on record."""
+    found = json.loads(record(name).read_text(encoding="utf-8"))
+    return found.get(processor()) if getattr(module(name), "BY_PROCESSOR", False) else found
+
+
+def write(name):
+    """Write the record of a snapshot, or its part for this kind of processor."""
+    taken = take(name)
+    if getattr(module(name), "BY_PROCESSOR", False):
+        others = json.loads(record(name).read_text(encoding="utf-8")) if record(name).exists() else {}
+        taken = {**others, processor(): taken}
+    record(name).write_text(text_of(taken), encoding="utf-8")
+
+
 def items(value, key=""):
     """Yield the keys (joined by " / ") and plain values inside a snapshot."""
     if isinstance(value, dict | list) and value:
@@ -74,7 +97,7 @@ def differences(old, new):
 
 def compare(name):
     """Return the differences between the record of a snapshot and the snapshot taken now."""
-    return differences(json.loads(record(name).read_text(encoding="utf-8")), take(name))
+    return differences(recorded(name), take(name))
 
 
 def main():
@@ -94,11 +117,13 @@ def main():
     status = 0
     for name in chosen:
         if options.write:
-            record(name).write_text(text_of(take(name)), encoding="utf-8")
+            write(name)
             print(f"{name}: written")
         elif not record(name).exists():
             status = 1
             print(f"{name}: has no record; write it with --write")
+        elif recorded(name) is None:
+            print(f"{name}: not on record for {processor()}; --write adds it, best at the commit that has the record")
         else:
             found = compare(name)
             status |= bool(found)

@@ -14,6 +14,7 @@ from typing import Any
 
 from haswell import airflock
 
+BY_PROCESSOR = True
 STUDY = (
     "evolve vasarhelyi_2018/6ms --out study --population 4 --generations 2 --agents 5 --duration 5 --seeds 2 --quiet"
 )

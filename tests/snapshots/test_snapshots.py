@@ -1,5 +1,7 @@
 """What must not change is as recorded; `python tests/snapshots/run.py NAME --write` records a change that is meant."""
 
+import json
+
 import pytest
 import run
 
@@ -22,3 +24,15 @@ def test_one_changed_value_is_seen():
     assert run.differences(old, {"a": {"b": [1, 3], "c": {}}, "d": "x"}) == [("a / b / 1", 2, 3)]
     assert run.differences(old, {"a": {"b": [1, 2]}, "d": "x"}) == [("a / c", {}, run.MISSING)]
     assert run.differences({"d": 1}, {"d": 1, "e": None}) == [("e", run.MISSING, None)]
+
+
+def test_bits_are_compared_only_on_a_kind_of_processor_that_is_on_record(monkeypatch):
+    names = [name for name in run.names() if getattr(run.module(name), "BY_PROCESSOR", False)]
+    assert {"golden", "store"} <= set(names)
+    for name in names:
+        kinds = json.loads(run.record(name).read_text(encoding="utf-8"))
+        for kind in kinds:
+            monkeypatch.setattr(run, "processor", lambda kind=kind: kind)
+            assert run.recorded(name) == kinds[kind]
+        monkeypatch.setattr(run, "processor", lambda: "i486")
+        assert run.recorded(name) is None
