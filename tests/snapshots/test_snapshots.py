@@ -28,7 +28,7 @@ def test_one_changed_value_is_seen():
 
 def test_bits_are_compared_only_on_a_kind_of_processor_that_is_on_record(monkeypatch):
     names = [name for name in run.names() if getattr(run.module(name), "BY_PROCESSOR", False)]
-    assert {"golden", "store"} <= set(names)
+    assert {"golden", "store", "users"} <= set(names)
     for name in names:
         kinds = json.loads(run.record(name).read_text(encoding="utf-8"))
         for kind in kinds:
