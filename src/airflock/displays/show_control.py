@@ -150,7 +150,6 @@ class StuckDetector:
         return np.asarray(np.linalg.norm(positions - self.seen[0][0], axis=1) < STEP)
 
 
-# The control assigns points to the drones, again when some fail, are pushed away or are stuck.
 NEAR = 1.0  # m; a drone is placed within
 CHECK = 5.0  # s; how often the master looks once all should be there
 LOOK = 1.0  # s; how often it looks for drones that make no progress

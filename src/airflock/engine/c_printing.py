@@ -171,9 +171,6 @@ def printed_part(
     return PrintedPart(name, rules, numbers, letter, own_rules, printer, functions)
 
 
-# ---- Text of the files
-
-
 def header_text(printed: PrintedPart, precision: int) -> str:
     """Return the header: numbers with unit, range and source, records, and the rules."""
     name, printer = printed.name, printed.printer
@@ -352,9 +349,6 @@ def command_text(printed: PrintedPart) -> str:
         f"const {name}_Percept *percept, real period)"
     )
     return "\n".join([head + " {", *(f"  (void){each};" for each in unread), *lines, "}"])
-
-
-# ---- The test that replays answers of plain Python
 
 
 class CasePercept(Percept):

@@ -255,8 +255,6 @@ UNDECLARED_KEYS: Mapping[str, Mapping[str, UndeclaredKey]] = {
     },
 }
 
-# --- A JSON schema, by which editors complete keys and mark what is wrong ---
-
 DRAFT = "http://json-schema.org/draft-07/schema#"  # read alike by Taplo, by VS Code and by validators
 NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*"  # before a unit, in text
 OWN_FILE = {"type": "string", "pattern": r"\.py$"}
