@@ -312,6 +312,7 @@ def declarations(record: Any) -> Iterator[tuple[str, Declaration, Any]]:
 
 @cache
 def _declarations(kind: type) -> tuple[tuple[str, Declaration, Any], ...]:
+    # Without its decorator a class keeps the fields themselves, and each default would be one.
     left = [name for name, value in vars(kind).items() if isinstance(value, Field)]
     if left:
         where = "@dataclass(frozen=True, kw_only=True) above the class"
@@ -350,6 +351,8 @@ class Parameters(metaclass=VectorMeta):
         for name, declared, _ in declarations(self):
             value = getattr(self, name)
             if isinstance(declared, Quantity):
+                # float() of a larger integer would raise; left as it is, it is refused in a line
+                # below.
                 if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**1023:
                     value = float(value)
                     object.__setattr__(self, name, value)  # 1 and 1.0 must not compile two kernels
@@ -384,6 +387,8 @@ def quantity_error(value: Any, declared: Quantity) -> str:
 
 def telling_digits(value: float, is_wrong: Callable[[float], bool]) -> str:
     """Format a number with as many digits as show what is wrong with it, six at least."""
+    # Six digits may round what is just outside of a range to its end, and the line would deny
+    # itself.
     texts = (f"{value:.{digits}g}" for digits in (6, 9, 12, 15))
     return next((text for text in texts if is_wrong(float(text))), repr(value))
 
@@ -413,6 +418,7 @@ def _are_points(value: Any, depth: int, axes: int) -> bool:
 
 
 def _frozen(value: Any) -> Any:
+    # float() would take "1" and True, which no file means as numbers.
     if isinstance(value, (str, bool)):
         raise TypeError(f"{value!r} is not a number")
     return tuple(_frozen(v) for v in value) if isinstance(value, (list, tuple)) else float(value)

@@ -184,6 +184,7 @@ def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = 
     found = []
     for run, generation, candidate, parameters, fitness in rows:
         place = {"run": run, "generation": generation, "candidate": candidate}
+        # A store may be damaged or come from elsewhere: the error names the row.
         with as_error(f"{store.path}: candidate {candidate} of generation {generation}", StudyError):
             fitnesses = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
             found.append({**place, **parse_values(parameters), **fitnesses})
@@ -265,6 +266,7 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float, float, float]:
     """Mean, SD, and Student's 95 % interval of the mean."""
     x = np.array(values, float)
     mean, sd = float(x.mean()), float(x.std(ddof=1)) if len(x) > 1 else 0.0
+    # By Student: a few fresh flights know little of their own spread.
     half = float(stats.t.ppf(0.975, len(x) - 1)) * sd / len(x) ** 0.5 if len(x) > 1 else 0.0
     return mean, sd, mean - half, mean + half
 

@@ -129,6 +129,7 @@ def _faults_between(
     errors = []
     axes = {axis.key: axis for axis in space.axes}
     for axis in space.axes:
+        # Followed to its end: numbers that lie above each other in a circle have no order.
         chain = [axis.key]
         while axes.get(chain[-1]) and axes[chain[-1]].above:
             chain.append(axes[chain[-1]].above)
@@ -145,6 +146,7 @@ def _faults_between(
         if tie.of not in axes and tie.of not in space.fixed:
             errors.append(f"space.{key}.tied = {tie.of!r} neither varies nor is fixed")
             continue
+        # A tie is a straight line, so its extremes are at the ends of the range.
         ends = (axes[tie.of].low, axes[tie.of].high) if tie.of in axes else (space.fixed[tie.of],)
         how = known[key][0]
         for end in ends:
@@ -197,6 +199,7 @@ def unread_keys(scenario: Scenario) -> set[str]:
     from airflock.engine import driver_text
 
     text = driver_text(scenario)
+    # The text of the driver is the proof: a choice has removed what it leaves unread.
     read = set(re.findall(r"\bp\.(\w+)", text)) | set(scenario.model.usual)
     return {f"model.{name}" for name in number_names(scenario.parameters) if name not in read}
 

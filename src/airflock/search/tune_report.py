@@ -71,6 +71,7 @@ def _figures(found: TuneResult) -> dict[str, Figure]:
 def _png(figure: Figure) -> str:
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=150, bbox_inches="tight")
+    # Inside of the page: a report is one file, which can be sent and signed.
     return base64.b64encode(stream.getvalue()).decode()
 
 
