@@ -264,7 +264,7 @@ def test_own_fitness_is_read_from_beside_the_study(tmp_path):
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_law_in_a_file_of_its_own_comes_along_with_the_winner(tmp_path):
-    law = Path(airflock.__file__).parent / "parts" / "laws" / "viragh_2014.py"
+    law = Path(airflock.__file__).parent / "parts" / "laws" / "viragh_2014" / "law.py"
     (tmp_path / "mine.py").write_text(law.read_text())
     (tmp_path / "mine.toml").write_text('duration = 1.0\nagents = 3\n[model]\nkind = "mine.py"\n')
     search = {"population": 4, "generations": 1, "top": 1, "final_seeds": 2}

@@ -9,7 +9,7 @@ import inspect
 import sys
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field, make_dataclass
+from dataclasses import dataclass, field, make_dataclass, replace
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
@@ -67,6 +67,7 @@ class Kind(Mapping[str, Part]):
     default : name of the member where a scenario names none
     fixed   : members that are no file; they come first
     shared  : keys of the section that mean the same for every member, so that they stay when it changes; None: all
+    shares  : a member of the folder without numbers of its own has those of the section: its Parameters are None
     take    : makes a member from other objects of the caller, if more than a member or a namespace is accepted
     check   : name of the public function that runs the standing list of truths on a member
     """
@@ -80,6 +81,7 @@ class Kind(Mapping[str, Part]):
     default: str = ""
     fixed: Mapping[str, Any] = field(default_factory=dict)
     shared: tuple[str, ...] | None = ()
+    shares: bool = False
     take: Callable[[Any], Part] | None = None
     check: str = ""
 
@@ -117,10 +119,11 @@ class Kind(Mapping[str, Part]):
                     if self.rules and not any(rule in vars(found) for rule in self.rules):
                         errors[name] = f"{owner}: {path} is no {self.noun}: it has none of {', '.join(self.rules)}"
                         continue
-                    name = namespace_names(found)[1]
+                    name, own_record = namespace_names(found)[1], "Parameters" in vars(found)
                     if name in members or name in self.fixed:
                         raise RuleError(f"another {self.noun} is named {name!r}; that one is used")
-                    members[name] = self.make(found, name)
+                    made: Any = self.make(found, name)
+                    members[name] = replace(made, Parameters=None) if self.shares and not own_record else made
                 except Exception as error:  # a file may fail in any way, and the others must still fly
                     errors[name] = _left_out(f"{owner}: {path}", error)
         return {**self.fixed, **dict(sorted(members.items()))}, errors

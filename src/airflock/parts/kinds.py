@@ -3,9 +3,6 @@
 Those that measure are beside the metrics, which are not on board.
 """
 
-from dataclasses import replace
-from typing import Any
-
 from airflock.core import (
     FAULT_RULES,
     Body,
@@ -29,12 +26,6 @@ from airflock.parts.radios.constant import CONSTANT
 PARTS = "airflock.parts."
 
 
-def _topology(namespace: Any, name: str) -> Topology:
-    """Gather a topology; one without numbers of its own has those of the section [topology]."""
-    made = topology(namespace, name)
-    return made if "Parameters" in vars(namespace) else replace(made, Parameters=None)
-
-
 LAWS = Kind(f"{PARTS}laws", "model", model, Model, (), "model", "vasarhelyi_2018", check="check_model")
 BODIES = Kind(f"{PARTS}bodies", "body", body, Body, ("ACCEPTS",), "body", "multirotor", check="check_body")
 SENSORS = Kind(
@@ -46,8 +37,8 @@ RADIOS = Kind(
     fixed={"constant": CONSTANT}, shared=number_names(PacketParameters), check="check_radio",
 )  # fmt: skip
 TOPOLOGIES = Kind(
-    f"{PARTS}topologies", "topology", _topology, Topology, ("meet",), "topology", "range",
-    fixed={"range": None}, check="check_topology",
+    f"{PARTS}topologies", "topology", topology, Topology, ("meet",), "topology", "range",
+    fixed={"range": None}, shares=True, check="check_topology",
 )  # fmt: skip
 FAULTS = Kind(f"{PARTS}faults", "kind of fault", fault, Fault, FAULT_RULES, check="check_fault")
 
