@@ -168,6 +168,7 @@ def boarded(scenario: Scenario, seed: int, place: FlightWorld, i: int, state: St
         hearing=PacketPolicy.simulated(scenario.radio.rule, scenario.radio.numbers),
         silence=scenario.resolved_silence(), body=scenario.body.rule, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
+        steer=scenario.resolved_steer(),
         gets_flock_solution=scenario.model.flock is not None,
         topology=scenario.topology.rule, t=scenario.topology.numbers,
     )  # fmt: skip

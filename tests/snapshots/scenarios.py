@@ -71,7 +71,7 @@ def kind(rule):
 
 def values(scenario):
     """Return all values of a scenario."""
-    covered = {*FIELDS, *TEXTS, *PARTS, "model", "parameters"}
+    covered = {*FIELDS, *TEXTS, *PARTS, "model", "parameters", "steer"}
     assert {each.name for each in fields(scenario)} == covered, "fields of a Scenario that this snapshot does not know"
     found = {name: plain(getattr(scenario, name)) for name in FIELDS}
     found["model"] = {"kind": kind(scenario.model), "numbers": plain(scenario.parameters)}
@@ -80,7 +80,8 @@ def values(scenario):
         # A topology of the package is a choice among its numbers.
         rule = scenario.own_topology if section == "topology" else part.rule
         found[section] = {"kind": kind(rule), "numbers": plain(part.numbers)}
-    return found
+    # How commands are converted counts where they are: most laws fly a body that takes theirs.
+    return found | ({"steer": plain(scenario.resolved_steer())} if scenario.model.steer else {})
 
 
 def outcome(*arguments):

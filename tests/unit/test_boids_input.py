@@ -23,7 +23,6 @@ BAD = {
     "metrics.k": (3.0, "metrics.k = 3 m lies outside [0, 2.25] m"),
     "metrics.sigma": (0.7, "metrics.sigma + metrics.gamma = 1.2 is not 1"),
     "metrics.count": ("all", "metrics.count = 'all' is none of each, program"),
-    "body.kind": ("multirotor", "takes a velocity, but model reynolds_1987 commands acceleration"),
     "radio.delay": (0.5, "update = 'sequential' needs ideal perception"),
     "update": ("random", "update = 'random' is none of synchronous, sequential"),
 }

@@ -62,6 +62,7 @@ from .model import (
     add_laws as add_laws,
     composition_errors as composition_errors,
     model as model,
+    steered_law as steered_law,
 )
 from .parameters import (
     Choice as Choice,

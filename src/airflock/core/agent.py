@@ -56,6 +56,7 @@ def decide(
     shared: Any = None,
     wing: Any = None,
     aero: Any = None,
+    steer: Any = None,
 ) -> Decision:
     """Decision of one agent.
 
@@ -67,6 +68,7 @@ def decide(
     time       : since the start of the flight, s; period : between two decisions, s
     index      : own index in the flock; group : number of its group, -1 in none; centre : of the arena, m
     shared     : what the model's `flock` found for this agent; wing, aero : parameters of the wing and of drag descent
+    steer      : numbers of the section [steer], for a law whose command is converted
     percept    : where rays or noise are wanted, one whose methods are bound to a range finder and to random numbers
 
     Raises RuleError where a rule asks for what the model does not provide.
@@ -83,10 +85,13 @@ def decide(
         "shared": shared,
         "wing": wing,
         "aero": aero,
+        "steer": steer,
         "p": p,
     }
     result = call_rule(model.decide, "decide", given, model.name)
     x, y, z = result[:3]
+    if model.steer is not None:
+        x, y, z = call_rule(model.steer, "steer", given | {"cx": x, "cy": y, "cz": z}, model.name)
     if model.added is not None:
         more = call_rule(model.added.decide, "decide", given, model.added.name)
         x, y, z = x + more[0], y + more[1], z + more[2]

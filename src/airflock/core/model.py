@@ -67,6 +67,14 @@ AGENT = {
     "wing": "parameters of the wing (aero.wing)",
     "aero": "parameters of the drag descent (aero.descent)",
 }
+STEER = {
+    "cx": "the law's command, east; a heading, m/s or m/s² as its COMMAND says",
+    "cy": "the law's command, north",
+    "cz": "the law's command, up",
+    "own": AGENT["own"],
+    "period": AGENT["period"],
+    "steer": "numbers of the section [steer]",
+}
 RULES = {
     "reach": {"p": "parameters"},
     "sight": {"p": "parameters"},
@@ -75,6 +83,7 @@ RULES = {
     "boundary": {**SURFACE, "p": "the model's parameters"},
     "flock": {**FLOCK, "p": "the model's parameters"},
     "decide": {**AGENT, "p": "the model's parameters"},
+    "steer": STEER,
 }
 
 
@@ -107,6 +116,7 @@ class Model:
     wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away have no effect; without it all are evaluated
     decide       : → command x, y, z and a Memory if the model declares one
     added        : a law whose command is added to that of `decide` (`add_laws`)
+    steer        : makes of the command of `decide` one of the kind `command`, which the body takes (`steered_law`)
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
     violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
@@ -138,6 +148,7 @@ class Model:
     terms: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     parts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     added: "Model | None" = None
+    steer: Callable[..., Any] | None = None
 
     @property
     def decide_rules(self) -> tuple[Callable[..., Any], ...]:
@@ -194,7 +205,7 @@ def model(namespace: Any, name: str = "") -> Model:
         if rule in found and record not in found:
             raise RuleError(f"model {name} has a rule {rule} but no {record} ({RECORDS[record]})")
     for kind in RULES:
-        if kind in found:
+        if kind in found and kind != "steer":
             argument_names(found[kind], kind, name)
     reduce = dict(found.get("REDUCE", {}))
     for key, how in reduce.items():
@@ -246,6 +257,11 @@ def _terms(given: Any, sums: Any, name: str) -> dict[str, tuple[str, str]]:
         if not (isinstance(words, tuple) and len(words) == 2 and all(isinstance(word, str) for word in words)):
             raise RuleError(f"model {name}: TERMS[{stem!r}] = {words!r}; give a word and a unit")
     return dict(given)
+
+
+def steered_law(law: Model, command: str, steer: Callable[..., Any]) -> Model:
+    """Return a law whose command a rule turns into one of another kind: a velocity, an acceleration or a heading."""
+    return replace(law, command=command, steer=steer)
 
 
 FIRST_ONLY_ARGUMENTS = ("p", "sums", "walls", "memory")  # what only the first law can have: there is one record of each

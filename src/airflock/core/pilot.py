@@ -116,7 +116,7 @@ class Pilot:
     silence  : the rule for neighbours that are lost; None, or one that flies on: they are forgotten
     flat     : fly in a plane: every z is zero
     seed     : of the random numbers that a law may ask for
-    wing, aero : parameters of the wing and of drag descent, for laws that ask for them
+    wing, aero, steer : numbers of the wing, of drag descent and of [steer], for laws that ask for them
     gets_flock_solution : the law decides for the whole flock; the caller passes its solution to `decide`
     topology, t : kind of topology, which selects among the heard, and its parameters; None: all
     groups   : of each agent the number of its group, -1 in none; empty where nobody is in one
@@ -140,6 +140,7 @@ class Pilot:
         seed: int = 0,
         wing: Any = None,
         aero: Any = None,
+        steer: Any = None,
         gets_flock_solution: bool = False,
         topology: Topology | None = None,
         t: Any = None,
@@ -152,6 +153,7 @@ class Pilot:
         )
         self._of_standing = for_standing_neighbour(self.silence) if self.silence is not None else None
         self.body, self.b, self.wing, self.aero, self.gets_flock_solution = body, b, wing, aero, gets_flock_solution
+        self.steering = steer
         self.topology, self.t, self.groups = topology, t, groups
         self.memory = initial_memory(model)
         self.stopped: Vector | None = None
@@ -297,6 +299,7 @@ class Pilot:
         return decide(
             self.model, self.p, own, near, walls, self.memory, time=time, period=self.period, index=self.index,
             group=self.group_of(self.index), percept=percept, shared=shared, wing=self.wing, aero=self.aero,
+            steer=self.steering,
         )  # fmt: skip
 
     def steer(self, own: State, now: float, goal: Vector | None = None) -> Vector:

@@ -17,7 +17,16 @@ from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.settings import settings_dict
 from airflock.scenarios.units import convert_units
-from airflock.support import FormatError, ScenarioError, as_error, expand_path, is_file, read_toml, suggest
+from airflock.support import (
+    AirflockError,
+    FormatError,
+    ScenarioError,
+    as_error,
+    expand_path,
+    is_file,
+    read_toml,
+    suggest,
+)
 from airflock.world import arena, load_field
 
 IMPORTED = "not a scenario; airflock import makes a recording of it (in Python: airflock.load_tracks)"
@@ -145,6 +154,7 @@ def load(
         notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
         document, settings, field_notes, wrong = with_field(document, settings_dict(settings, where), folder)
         if own_law is not None:
+            document = _with_robot_of(document, where, folder, trust)
             kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else own_law.name
             document = {**document, "model": {"kind": kind}, "published": {}}
         return build_scenario(
@@ -157,6 +167,17 @@ def load(
             known_errors=wrong,
             trust=trust,
         )
+
+
+def _with_robot_of(document: dict[str, Any], where: str, folder: Path | None, trust: bool) -> dict[str, Any]:
+    """Return a document that names the body and the preferred speed of its law, for another law that flies the same."""
+    try:
+        before = build_scenario(document, where, folder=folder, trust=trust)
+    except AirflockError:
+        return document  # what is wrong with it is said with the new law
+    speed, steer = before.model.speed(before.parameters), document.get("steer", {})
+    body = {"kind": before.body.rule.name, **document.get("body", {})}
+    return {**document, "body": body, "steer": {"speed": speed, **steer} if speed else steer}
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:

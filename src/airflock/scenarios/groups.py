@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from airflock.core import Body, Choice, Model, Quantity, Sensor, argument_names, choices, declarations, random
+from airflock.parts.steering import law_for_command
 from airflock.scenarios import schema
 from airflock.scenarios.named_code import find_law
 from airflock.scenarios.scenario_checks import body_errors, sensor_errors, silence_errors
@@ -110,21 +111,16 @@ class GroupLawReader:
         if kind == self.kind:
             return self.model
         if isinstance(kind, str) and kind in known:
-            return known[kind]
-        self._read[kind] = law = find_law(kind, self.folder, where=f"{where}.kind", trust=self.trust)
-        return law
+            return law_for_command(known[kind], self.model.command)
+        self._read[kind] = find_law(kind, self.folder, where=f"{where}.kind", trust=self.trust)
+        # One body carries all agents, and a body takes one kind of command.
+        return law_for_command(self._read[kind], self.model.command)
 
     def _misfits(self, where: str, kind: Any, found: Model) -> list[str]:
         """Return why a law cannot fly beside that of the flock."""
         errors, key, base = [], f"{where}.kind = {kind!r}", self.model
         if found is base:
             return []
-        # One body carries all agents, and a body takes one kind of command.
-        if found.command != base.command:
-            errors.append(
-                f"{key}: model {found.name} commands {found.command}, and model {base.name} of the flock "
-                f"{base.command}; one body carries all"
-            )
         for law in (base, found):
             if law.flock is not None:
                 errors.append(f"{key}: model {law.name} solves for the whole flock, so all fly by it")

@@ -28,6 +28,7 @@ from airflock.core import (
 )
 from airflock.parts import BODIES, RADIOS, SENSORS, SETS, TOPOLOGIES, default_body
 from airflock.parts.aero import descent
+from airflock.parts.steering import law_for_command
 from airflock.scenarios.named_code import build_from_file, find_law
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
@@ -182,9 +183,8 @@ def collect_parts(
     # velocity.
     usual = default_body(law.command if law else "velocity")
     body, of_body = one(BODIES, caller_parts.body, usual)
-    of_body = of_body or body_law_errors(
-        body, law, caller_parts.body.name if caller_parts.body else named_kind(BODIES, document, usual)
-    )
+    if law is not None and not of_body:
+        law = law_for_command(law, body.accepts)
     # Check the rest of the document with a body that fits, so that one wrong name does not cause
     # ten more errors.
     if of_body and caller_parts.body is None:
@@ -236,14 +236,3 @@ def _law(
     # The section [aero] alone adds drag descent: no preset needs a second law for it.
     more = drag_descent_errors(law)
     return law if more else with_drag_descent(law), errors + more
-
-
-def body_law_errors(body: Body, model: Model | None, kind: str) -> list[str]:
-    """Return why a body cannot fly the command of a model, one line."""
-    if model is None or body.accepts == model.command:
-        return []
-    taken = f"{'an' if body.accepts[0] in 'aeiou' else 'a'} {body.accepts}"
-    return [
-        f"body.kind = {kind!r} takes {taken}, but model {model.name} commands {model.command}; "
-        f"body.kind = {default_body(model.command)!r} takes it"
-    ]

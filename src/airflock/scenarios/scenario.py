@@ -26,7 +26,7 @@ from airflock.core import (
     random,
     with_defaults,
 )
-from airflock.parts import SENSORS, TOPOLOGIES
+from airflock.parts import SENSORS, TOPOLOGIES, steering
 from airflock.parts.aero import descent, wing as wings
 from airflock.parts.bodies import wind
 from airflock.parts.metrics import Parameters as MetricParameters, parameters as metric_parameters
@@ -67,7 +67,7 @@ class Scenario:
 
     model and parameters : the flocking law and its numbers
     body, sensors, radio, topology, metrics : parts, each a rule and its numbers; SI units
-    wind, world, scene, goals, start, wing, aero, silence : numbers of the other sections
+    wind, world, scene, goals, start, wing, aero, silence, steer : numbers of the other sections
     flight    : number of agents, duration (s), motion step (s)
     groups    : agents that share numbers or a law; faults: faults of single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
@@ -95,6 +95,7 @@ class Scenario:
     wing: wings.Parameters
     aero: descent.Parameters
     silence: SilenceParameters
+    steer: steering.Parameters
     metrics: Part[MetricSet, metric_parameters.Parameters]
     topology: Part[Topology | None, Any]
     flight: Flight
@@ -178,6 +179,8 @@ class Scenario:
         }
         # The dead time is counted in steps (`step_counts`); no rule of a body reads it.
         columns["b"] = tuple(name for name in columns["b"] if name not in number_names(BodyParameters))
+        if not any(law.model.steer for law in self.laws):
+            del columns["steer"]
         return columns | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
 
     @cached_property
@@ -333,6 +336,12 @@ class Scenario:
         known = self.metrics.numbers.max_e is not None or largest_extension(self.world)
         return set() if known else {"cns_ext", "quality", "cns_ext_groups", "quality_groups"}
 
+    def resolved_steer(self) -> steering.Parameters:
+        """Return how commands are converted, open numbers derived from the law, the fitness and the body."""
+        speed = self.resolved_metrics().v_flock if self.steer.speed is None else self.steer.speed
+        response = getattr(self.body.numbers, "tau", self.sensors.period or self.flight.dt)
+        return replace(self.steer, speed=speed, response=self.steer.response or response)
+
     def resolved_silence(self) -> SilenceParameters:
         """Return the rule of silence, open numbers derived from the rest of the scenario."""
         return self._silent
@@ -417,7 +426,7 @@ def default_metrics(scenario: Scenario) -> MetricParameters:
     numbers = dict(vars(scenario.metrics.numbers))
     p, model = scenario.parameters, scenario.model
     if numbers["v_flock"] is None:
-        numbers["v_flock"] = 1.0 if model.preferred_speed is None else model.speed(p)
+        numbers["v_flock"] = (scenario.steer.speed or 1.0) if model.preferred_speed is None else model.speed(p)
     if numbers["v_tol"] is None:
         numbers["v_tol"] = 0.375 * numbers["v_flock"]
     if numbers["r_comm"] is None:

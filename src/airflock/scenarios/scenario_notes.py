@@ -29,6 +29,12 @@ def setting_notes(scenario: Scenario) -> list[str]:
             f"metrics.max_e is missing: without an arena the largest extension is unknown, so {', '.join(sorted(nan))} "
             "are nan; give metrics.max_e in m"
         )
+    if scenario.model.steer is not None:
+        q = scenario.resolved_steer()
+        notes.append(
+            f"model {scenario.model.name} commands another kind than body {scenario.body.rule.name} takes, so [steer] "
+            f"converts it: speed = {q.speed:g} m/s, response = {q.response:g} s"
+        )
     p = scenario.parameters
     body, duration = scenario.body.numbers, scenario.flight.duration
     if getattr(body, "battery", "endless") == "lithium" and getattr(body, "hover_power", 0.0) > 0.0:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from airflock.core import Parameters as Record, choice, quantity, silence
+from airflock.parts import steering
 from airflock.parts.aero import descent, wing
 from airflock.parts.bodies import dryden, motion, wind
 from airflock.parts.metrics import parameters as metrics
@@ -113,5 +114,6 @@ ORDER = (
     Section("wind", wind.Parameters, "air", dryden.Numbers),
     Section("topology", topology.Parameters, "topology"),
     Section("silence", silence.Parameters, "silence"),
+    Section("steer", steering.Parameters, "steer"),
 )
 SECTIONS: dict[str, type[Record]] = {each.key: each.record for each in ORDER if each.key and each.record is not None}

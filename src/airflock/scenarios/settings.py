@@ -20,6 +20,9 @@ from airflock.support import ScenarioError, suggest, to_identifier
 TOP_LEVEL_KEYS = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
 
 
+STEERED = {"speed_max": "speed", "speed": "speed", "turn": "turn"}  # number of a body → number of [steer]
+
+
 def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
     """Return a document without the numbers of each part for which settings name another kind, and notes on it.
 
@@ -36,6 +39,11 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
             before = named_kind(family, document)
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {before} are left out")
         document = {**document, section: kept}
+        # How fast a body flew and turned by itself is how a law's command is converted for another one.
+        gone = set(table) - set(kept) if section == "body" else set()
+        moved = {name: table[own] for own, name in STEERED.items() if own in gone}
+        if moved and isinstance(document.get("steer", {}), Mapping):
+            document["steer"] = moved | document.get("steer", {})
     law = document.get("model", {})
     before = value_of(law.get("kind")) if isinstance(law, Mapping) else None
     if "model.kind" in settings and before not in (None, settings["model.kind"]):

@@ -25,7 +25,7 @@ from airflock.core import (
     quantity,
 )
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot, ParameterCheck
-from airflock.parts import BODIES, LAWS, TOPOLOGIES
+from airflock.parts import BODIES, LAWS, TOPOLOGIES, steering
 from airflock.parts.topologies import parameters as topologies
 from airflock.support import (
     AirflockError,
@@ -301,8 +301,7 @@ def read_member_parts(
         b = read_record(body.Parameters, usual["body"] | row["body"], f"{where}.body", errors)
         if "kind" in row["law"]:
             other, p = read_law(row["law"], errors, f"{where}.law")
-            if other is not None and other.command != law.command:
-                errors.append(f"{where}.law commands {other.command}, and law {law.command}; one body carries all")
+            other = None if other is None else steering.law_for_command(other, law.command)
         else:
             other, p = law, read_record(law.Parameters, usual["law"] | row["law"], f"{where}.law", errors)
         if other is not None:
@@ -323,7 +322,8 @@ CARD_KEYS = (
 OPTIONAL_CARD_KEYS = (
     "topology",
     "groups",
-)  # left out where a drone meets all that it hears, and where no law uses groups
+    "steer",
+)  # left out where a drone meets all that it hears, no law uses groups, and the body takes the law's command
 HEARING_KEYS = (
     "once",
     "any_stamp",
@@ -370,6 +370,7 @@ class FlightCard:
     delay: float
     silence: SilenceParameters
     topology: topologies.Parameters
+    steer: steering.Parameters
     safety: SafetyLimits
     fence: Fence
     low: float
@@ -410,7 +411,7 @@ class FlightCard:
         return Pilot(
             law, p, self.place.seen(wall_reach(law, p)), index=index, period=self.period, groups=self.groups,
             hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
-            seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
+            steer=self.steer, seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
 
     def sides(self, own: State) -> list[tuple[float, float, float, float]]:
@@ -501,6 +502,8 @@ def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard |
     operator = read_public_key(d["operator"], errors)
     law, parameters = read_law(d["law"], errors)
     body, numbers = read_body(d["body"], errors)
+    law = law if law is None or body is None else steering.law_for_command(law, body.accepts)
+    steer = read_record(steering.Parameters, d.get("steer", {}), "steer", errors)
     own = read_member_parts(d, law, body, errors)
     world = read_record(arena.Parameters, d["world"], "world", errors)
     silence = read_record(SilenceParameters, d["silence"], "silence", errors)
@@ -534,6 +537,7 @@ def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard |
         delay=radio["delay"],
         silence=silence,
         topology=topology,
+        steer=steer,
         safety=safety,
         fence=Fence(corners),
         low=fence["low"],

@@ -112,8 +112,15 @@ def decide(
             percept=percept if perceives else None, period=numbers.c.period, wing=numbers.wing, aero=numbers.aero,
             p=own_p,
         )  # fmt: skip
-        for a in axes:
-            flock.command[a][i] = o[a]
+        if model.steer is not None:  # the body takes another kind of command than the law gives
+            steered = call_rule(
+                model.steer, cx=o[X], cy=o[Y], cz=o[Z], own=own, period=numbers.c.period, steer=numbers.steer
+            )
+            for a in axes:
+                flock.command[a][i] = steered[a]
+        else:
+            for a in axes:
+                flock.command[a][i] = o[a]
         if model.added is not None:
             add_command(i, own, shared, percept if perceives else None, flock, numbers, plan=plan, model=model)
         if law_asks(model, "memory"):

@@ -61,6 +61,8 @@ def probe_model(model: Model, parameters: Any) -> None:
     if model.flock is not None:
         law.check_rule(model.flock)
         given["shared"] = _shared(model, given)
+    if model.steer is not None:
+        law.check_rule(model.steer)
     if model.added is not None:
         law.check_rule(model.added.decide)
         _call(model.added.decide, "decide", given, model.added.name)

@@ -1,0 +1,94 @@
+"""Any law flies any robot: commands are converted where the body takes another kind than the law gives."""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+import airflock
+from against_reference import compared
+from airflock.core import Own
+from airflock.parts import BODIES
+from airflock.parts.steering import STEERING, Parameters
+from scenarios_drawn import Draw
+
+
+def flown(law, body, **more):
+    """A flight of a law on a body of a preset."""
+    settings = {"agents": 10, "duration": 60.0, "body.kind": body, "world.side": 400.0, **more}
+    return airflock.load("vasarhelyi_2018/4ms", settings, law=law)
+
+
+@pytest.mark.parametrize(
+    ("pair", "rule"), STEERING.items(), ids=lambda value: "-".join(value) if isinstance(value, tuple) else ""
+)
+def test_a_conversion_there_and_back_is_the_command_itself(pair, rule):
+    own, steer = Own(1.0, 2.0, 0.0, 0.4472135954999579, 0.8944271909999159, 0.0), Parameters(speed=4.0, response=0.5)
+    back = STEERING[pair[::-1]]
+    command = {"heading": (0.6, 0.8, 0.0), "velocity": (2.4, 3.2, 0.0), "acceleration": (1.0, -1.0, 0.0)}[pair[0]]
+    given = {"own": own, "period": 0.1, "steer": steer}
+
+    def call(function, c):
+        names = function.__code__.co_varnames[: function.__code__.co_argcount]
+        values = given | dict(zip(("cx", "cy", "cz"), c, strict=True))
+        return function(*(values[name] for name in names))
+
+    again = call(back, call(rule, command))
+    if "heading" not in pair or pair[0] == "heading":
+        assert again == pytest.approx(command, abs=1e-6)
+    else:  # a heading keeps the direction of what was wanted, and no more
+        wanted = np.array(command) if pair[0] == "velocity" else np.array(own[:3]) + 0.5 * np.array(command)
+        found = np.array(again) if pair[0] == "velocity" else np.array(own[:3]) + 0.5 * np.array(again)
+        assert found / np.linalg.norm(found) == pytest.approx(wanted / np.linalg.norm(wanted), abs=1e-6)
+
+
+def test_a_heading_turns_by_at_most_the_largest_rate():
+    rule, own = STEERING["heading", "velocity"], Own(2.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+    x, y, z = rule(0.0, 1.0, 0.0, own, 0.1, Parameters(speed=3.0, turn=2.0, response=1.0))
+    assert math.atan2(y, x) == pytest.approx(0.2) and math.hypot(x, y) == pytest.approx(3.0) and z == 0.0
+
+
+@pytest.mark.parametrize(("law", "body"), [("couzin_2002", "multirotor"), ("reynolds_1987", "quadrotor"),
+                                           ("vasarhelyi_2018", "heading"), ("viragh_2014", "steered")])  # fmt: skip
+def test_a_steered_flight_is_that_of_the_pilots(law, body):
+    scenario = flown(law, body, agents=6, duration=4.0)
+    assert scenario.model.steer is not None
+    assert compared(Draw(scenario, 3, None, {})).agrees
+
+
+def test_a_group_of_another_law_and_command_is_that_of_the_pilots():
+    fish = [{"name": "fish", "agents": 2, "model": {"kind": "couzin_2002"}}]
+    scenario = airflock.load("vasarhelyi_2018/4ms", {"agents": 6, "duration": 4.0, "groups": fish})
+    assert scenario.laws[1].model.steer is not None
+    assert compared(Draw(scenario, 3, None, {})).agrees
+
+
+@pytest.mark.parametrize(
+    "preset", ["couzin_2002/torus", "couzin_2005/informed", "vicsek_1995/ordered", "zapotecatl_2016/best"]
+)
+def test_laws_of_headings_and_accelerations_fly_multirotors(preset):
+    """The mean speed is above half of that of the same flight on the law's own body."""
+    few = {"agents": 10, "duration": 30.0}
+
+    def speed(settings):
+        recording = airflock.simulate(airflock.load(preset, few | settings), seed=1)
+        return float(np.linalg.norm(recording["velocity"].values, axis=1).mean())
+
+    assert speed({"body.kind": "multirotor"}) > 0.5 * speed({})
+
+
+def test_a_law_that_replaces_another_flies_its_body_at_its_speed():
+    scenario = airflock.load("vasarhelyi_2018/8ms", {"body.tau": 0.7}, law="couzin_2002")
+    assert scenario.body.rule.name == "multirotor" and scenario.body.tau == 0.7
+    steer = scenario.resolved_steer()
+    assert (steer.speed, steer.response) == (8.0, 0.7)
+    assert any("[steer]" in note for note in scenario.notes)
+
+
+def test_a_law_on_a_body_that_takes_its_command_is_not_steered():
+    assert all(airflock.load(name).model.steer is None for name in airflock.presets())
+    assert set(STEERING) == {
+        pair for pair in product(("velocity", "acceleration", "heading"), repeat=2) if len(set(pair)) == 2
+    }
+    assert {BODIES[name].accepts for name in BODIES} <= {"velocity", "acceleration", "heading"}
