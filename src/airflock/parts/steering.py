@@ -7,7 +7,9 @@ acceleration gets what closes the gap in that time. Ours; an ideal body makes of
 """
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from airflock.core import Model, Parameters as Record, arc_cosine, norm, quantity, shorten, steered_law
 
@@ -84,7 +86,7 @@ def heading_to_acceleration(cx, cy, cz, own, period, steer):
 
 
 # What a law commands, and what the body takes → the rule.
-STEERING = {
+STEERING: Mapping[tuple[str, str], Callable[..., Any]] = {
     ("heading", "velocity"): heading_to_velocity,
     ("heading", "acceleration"): heading_to_acceleration,
     ("acceleration", "velocity"): acceleration_to_velocity,
