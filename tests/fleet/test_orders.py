@@ -1,5 +1,7 @@
 """Orders that come at a bad moment: a start that is called off or comes too late, a kill that nobody follows."""
 
+import math
+
 import pytest
 
 from airflock.drones.mavlink.orders import OrderKind
@@ -92,6 +94,32 @@ def test_a_kill_is_repeated_until_the_autopilot_follows_and_no_longer():
     vehicle.armed, vehicle.mode = True, PILOT_MODE  # it fell; somebody else has another flight in mind
     found.advance(5.0)
     assert vehicle.armed
+
+
+def test_drones_that_hold_beside_each_other_flock_on_and_part():
+    """Else both would wait for ever until the other one is far."""
+    found = in_the_air()
+    found.order(OrderKind.HOLD)
+    found.advance(5.0)
+    for x, v in zip((0.0, 1.5), found.vehicles, strict=True):
+        v.state = v.state._replace(x=x, y=0.0, vx=0.0, vy=0.0)
+    found.advance(5.0)
+    found.order(OrderKind.RESUME)  # their positions jumped by this; somebody has looked
+    found.advance(8.0)
+    assert found.phases() == [MissionPhase.FLOCK] * 2, found.log[-4:]
+    one, other = (v.state for v in found.vehicles)
+    assert math.dist(one[:2], other[:2]) > 4.0
+
+
+def test_resume_that_cannot_be_followed_yet_names_the_reason():
+    found = in_the_air()
+    found.order(OrderKind.HOLD)
+    found.advance(5.0)
+    found.vehicles[0].accuracy = 9.0
+    found.advance(1.0)
+    found.order(OrderKind.RESUME)
+    found.advance(1.0)
+    assert told(found, "holds on: bad navigation") and found.phases()[0] == MissionPhase.HOLD
 
 
 @pytest.mark.parametrize("kind", ["px4", "ardupilot"])

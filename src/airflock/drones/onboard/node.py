@@ -246,6 +246,8 @@ class Node:
         if known.order == OrderKind.GOTO and self.phase != MissionPhase.GOTO:
             why = ": its position jumped; look where it is, then resume" if self.operator.needs_resume else ""
             self._notes.append(f"the point that was ordered is not followed in {self.phase.name}{why}")
+        if known.order == OrderKind.RESUME and self.phase == MissionPhase.HOLD and known.reasons_to_hold:
+            self._notes.append(f"holds on: {', '.join(known.reasons_to_hold)}")
         # A resume must not be followed minutes later, once the pilot has taken off.
         if known.resume_ordered and self.phase == MissionPhase.MANUAL and (known.is_landed or not known.is_high):
             self.operator.resume_ordered = False

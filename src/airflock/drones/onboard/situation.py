@@ -6,7 +6,7 @@ from airflock.core import State, norm
 from airflock.drones.mavlink.autopilots import STREAM_RATES
 from airflock.drones.mavlink.frames import common_dialect
 from airflock.drones.onboard.card import FlightCard
-from airflock.drones.onboard.mission import FLYING_PHASES, MissionFacts, MissionPhase
+from airflock.drones.onboard.mission import FLOCKING_PHASES, FLYING_PHASES, MissionFacts, MissionPhase
 from airflock.drones.onboard.peers import (
     AGE_COUNT,
     HEARD_WITHIN,
@@ -251,7 +251,8 @@ def mission_facts(
         "bad navigation": gnss_bad,
         "too few neighbours": few,
         "a suspicious clock": clock_bad,
-        "a neighbour is near": near,
+        # The law parts those that hold beside each other; holding on would never.
+        "a neighbour is near": near and not (phase == MissionPhase.HOLD and known.phase_before_hold in FLOCKING_PHASES),
         "overloaded": known.is_overloaded,
         "the operator is lost": operator_lost and s.operator_lost == "hold",
         # The way home can be flown by slow streams: standing until the battery ends is worse.
