@@ -587,11 +587,12 @@ def minutes_without_a_unit(rng, tmp_path):
 
 
 @question
-def milliseconds_without_a_unit(rng, tmp_path):
-    truth = Truth(rng)
-    x, y, unit = [("x_m", "y_m", ""), ("x", "y", "m")][rng.integers(2)]  # without any, they may be degrees
-    table = truth.long(t=rng.choice(["timestamp", "time"]), x=x, y=y, times=(1e3 * truth.t).astype(int))
-    return csv(tmp_path, table), {"unit": unit} if unit else {}, "ms? Write --time-unit ms; if they are seconds"
+def thousandths_without_a_unit(rng, tmp_path):
+    truth = Truth(rng, rate=float(rng.choice([2.0, 5.0, 10.0, 20.0])))
+    unit, factor = [("ms", 1e3), ("us", 1e6)][rng.integers(2)]
+    x, y, options = [("x_m", "y_m", {}), ("x", "y", {"unit": "m"})][rng.integers(2)]  # without any, they may be degrees
+    table = truth.long(t=rng.choice(["timestamp", "time"]), x=x, y=y, times=(factor * truth.t).astype(int))
+    return csv(tmp_path, table), options, f"{unit}? Write --time-unit {unit}; if they are seconds"
 
 
 def received(rng):

@@ -24,7 +24,7 @@ from airflock.recordings.imports import (
     track_checks,
 )
 from airflock.recordings.imports.common_frame import to_local_frame
-from airflock.recordings.imports.table_columns import quote_column
+from airflock.recordings.imports.table_columns import TIME_UNITS, quote_column
 from airflock.recordings.imports.track import (
     ACCEPTABLE_ERRORS,
     GEODETIC_TARGETS,
@@ -35,7 +35,7 @@ from airflock.recordings.imports.track import (
     ImportReport,
     ignore_progress,
 )
-from airflock.recordings.imports.track_checks import SINCE_1970
+from airflock.recordings.imports.track_checks import SINCE_1970, SLOW
 from airflock.recordings.reader_process import refuse_archive, refuse_pickle_file
 from airflock.support import RecordingError, as_error, expand_path, is_number
 
@@ -329,7 +329,8 @@ def _question_units(tracks: list[ImportedTrack], findings: ImportReport) -> None
             f'--map "t:={t}*86400", if hours *3600, if minutes *60; or name the unit of lengths{keep}', "time",
         )  # fmt: skip
     elif bare and step >= SLOW and (usual <= 1e-3 * FASTEST or "x" in first.unnamed):
-        findings.add_error(f"{line} and are {step:g} apart: ms? Write --time-unit ms{keep}", "time")
+        unit = next((unit for unit in ("ms", "us") if step * TIME_UNITS[unit] < SLOW), "ns")
+        findings.add_error(f"{line} and are {step:g} apart: {unit}? Write --time-unit {unit}{keep}", "time")
     elif bare:
         findings.notes.append(
             f"{where} {first.label('t')} without a unit: taken as s, so that rows are {step:.4g} s apart and move by "
@@ -395,7 +396,6 @@ def _placed(path: Path, tracks: list[ImportedTrack]) -> list[ImportedTrack]:
 SLOWEST, FASTEST = 2.5e-3, 100.0  # m/s: usual speeds beyond are in other units, where nobody has named them
 MAX_SPEED = 1000.0  # m/s of usual motion; faster than an aircraft of any kind whose flock could be scored
 QUICKEST = 1.0 / 300.0  # s between rows; only cameras of high speed are quicker, whose files count frames
-SLOW = 5.0  # s between rows; what is as slow may count milliseconds
 
 
 # All options are checked together, so that a user corrects them in one go.
@@ -405,7 +405,7 @@ def check_options(
     """Refuse options that cannot be meant, all at once. Raises RecordingError."""
     choices = {
         "unit": (*table_columns.LENGTH_UNITS, *table_columns.PIXEL_UNITS),
-        "time_unit": (*table_columns.TIME_UNITS, "frames", *table_columns.DATE_ORDERS), "axes": ("enu", "ned"),
+        "time_unit": (*TIME_UNITS, "frames", *table_columns.DATE_ORDERS), "axes": ("enu", "ned"),
     }  # fmt: skip
 
     def check(sound: Any, line: str) -> None:

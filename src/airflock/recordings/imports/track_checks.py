@@ -202,12 +202,11 @@ def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) 
         findings.notes.append(f"{source}: {named}{line}")
 
 
-STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
 SEVERAL = (
     "two individuals under one id? Map another column: --map id:=COLUMN; or --map receiver:=COLUMN if it parts "
     "receivers of one drone"
 )
-SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
+SLOW = 5.0  # s between rows: what is as slow may count a thousandth
 SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain
 LEAST = 0.2  # share of the common span below which an individual is worth a question
 
@@ -234,17 +233,14 @@ def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 def _wrong_step(track: ImportedTrack) -> str:
-    """Return the error of the time between rows; empty if there is none."""
+    """Return the error of a unit that would be odd for so slow a log; empty if there is none."""
     step, name = median_period(track), track.label("t")
-    where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
-    if step and not STEPS[0] <= step <= STEPS[1]:
-        ways = '*1e-6" (for us) or *1e-3 (for ms)' if step > STEPS[1] else '*86400" (for days) or *3600 (for hours)'
-        return f'{where}; the unit is another one: write --map "t:={quote_column(name)}{ways}'
     unit, finer = split_header(name)[1], {"ms": ("us", 1e-6), "us": ("ns", 1e-9), "µs": ("ns", 1e-9)}
-    if unit in finer and step >= SLOW and track.time[0] < SINCE_1970 and not track.has(VELOCITY_TARGETS):
-        other, factor = finer[unit]
-        return f'{where}: {other} named {unit}? Write --map "t:={quote_column(name)}*{factor:g}"'
-    return ""
+    if unit not in finer or step < SLOW or track.time[0] >= SINCE_1970 or track.has(VELOCITY_TARGETS):
+        return ""
+    where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
+    other, factor = finer[unit]
+    return f'{where}: {other} named {unit}? Write --map "t:={quote_column(name)}*{factor:g}"'
 
 
 def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> None:
