@@ -204,11 +204,30 @@ def read_mat(path: Path, options: ImportOptions, findings: ImportReport) -> list
     return read_members({name: a.T if new else a for name, a in arrays.items()}, path, options, findings)
 
 
-def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Read trajectories.h5 of idtracker.ai (its documented keys), or any HDF5 file with such a dataset.
+def _texts(names: Any) -> list[str]:
+    return [name.decode() if isinstance(name, bytes) else str(name) for name in np.atleast_1d(names).tolist()]
 
-    file : its arrays and attributes, as `recordings.reader_process` hands them over
+
+def _read_sleap(file: xr.Dataset, path: Path, options: ImportOptions) -> list[ImportedTrack]:
+    """Read an analysis file of SLEAP: tracks (individual, axis, keypoint, frame) in pixels."""
+    keypoints = _texts(file["node_names"].values)
+    number = keypoints.index(choose_keypoint(keypoints, options, str(path)))
+    values = file["tracks"].values[:, :, number].transpose(2, 0, 1)
+    given = _texts(file["track_names"].values) if "track_names" in file else []
+    return read_array(values, options, str(path), given if len(given) == values.shape[1] else None)
+
+
+OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
+
+
+@reader("HDF5 of movement, idtracker.ai or SLEAP", suffixes=(".h5", ".hdf5"))
+def read_hdf5(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """`trajectories` of idtracker.ai with its frame rate, `tracks` of an analysis file of SLEAP by `--keypoint`,
+    datasets of `movement`; other arrays as those of NumPy.
     """
+    file = ReaderProcess(path, read_hdf5_arrays, "a HDF5 file").answer()
+    if "position" in file:
+        return read_netcdf(path, options, findings)
     if "node_names" in file and "tracks" in file:
         return _read_sleap(file, path, options)
     if "groups" in file.attrs and not file.variables:
@@ -231,33 +250,6 @@ def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, finding
     given = [] if labels is None else _texts(labels)
     names = given if len(given) == values.shape[1] else None
     return read_array(values, options, str(path), names, fps, findings)
-
-
-def _texts(names: Any) -> list[str]:
-    return [name.decode() if isinstance(name, bytes) else str(name) for name in np.atleast_1d(names).tolist()]
-
-
-def _read_sleap(file: xr.Dataset, path: Path, options: ImportOptions) -> list[ImportedTrack]:
-    """Read an analysis file of SLEAP: tracks (individual, axis, keypoint, frame) in pixels."""
-    keypoints = _texts(file["node_names"].values)
-    number = keypoints.index(choose_keypoint(keypoints, options, str(path)))
-    values = file["tracks"].values[:, :, number].transpose(2, 0, 1)
-    given = _texts(file["track_names"].values) if "track_names" in file else []
-    return read_array(values, options, str(path), given if len(given) == values.shape[1] else None)
-
-
-OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
-
-
-@reader("HDF5 of movement, idtracker.ai or SLEAP", suffixes=(".h5", ".hdf5"))
-def read_hdf5(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """`trajectories` of idtracker.ai with its frame rate, `tracks` of an analysis file of SLEAP by `--keypoint`,
-    datasets of `movement`; other arrays as those of NumPy.
-    """
-    plain = ReaderProcess(path, read_hdf5_arrays, "a HDF5 file").answer()
-    if "position" in plain:
-        return read_netcdf(path, options, findings)
-    return read_idtracker(plain, path, options, findings)
 
 
 @reader("netCDF of movement", suffixes=(".nc",))
