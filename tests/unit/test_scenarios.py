@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 import airflock
 from airflock.recordings.flown_scenario import scenario_of_recording
-from airflock.runs.dask_cluster import rebuild_scenario
+from airflock.runs.executors import rebuild_scenario
 from airflock.runs.folder import write_toml_file
 from airflock.scenarios import formats
 from airflock.scenarios.files import load, presets, scenario_variant
