@@ -21,6 +21,7 @@ from haswell import airflock
 from snapshots import options
 from snapshots._files import write_files
 
+BY_PROCESSOR = True
 SMALL = "--agents 5 --duration 5"
 CASES = (  # in this order: later ones read what earlier ones wrote
     f"run vasarhelyi_2018/4ms {SMALL} --seeds 2 --json",
