@@ -14,7 +14,6 @@ from airflock.support import INVALID, PICTURES, SCENARIOS, ScenarioError, invali
 
 def evolve(
     ctx: typer.Context,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the study.", show_default=False)],
     scenario: Annotated[
         str | None,
         typer.Argument(
@@ -23,6 +22,7 @@ def evolve(
             help="A preset, a scenario file, or a study file; none to --resume what the folder holds.",
         ),
     ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the study.", show_default=False)] = None,
     algorithm: Annotated[str | None, typer.Option(help="cmaes, ga or nsga2.", show_default="cmaes")] = None,
     population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default="100")] = None,
     generations: Annotated[int | None, typer.Option(help="Generations per run.", show_default="150")] = None,
@@ -90,7 +90,7 @@ def evolve(
 
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
-    from airflock.runs import check_timeout, open_folder
+    from airflock.runs import check_timeout, open_folder, run_place
     from airflock.search import (
         check_sensitivity_method,
         check_study_device,
@@ -101,6 +101,7 @@ def evolve(
     )
 
     errors = options.collect_option_errors(ctx)
+    place = errors.read(run_place, out)
     given = {
         "algorithm": algorithm,
         "population": population,
@@ -120,7 +121,7 @@ def evolve(
         limit=limit or (),
         trust=trust,
         fast=fast,
-        folder=out if resume else None,
+        folder=place if resume else None,
     )
     errors.read(check_sensitivity_method, sensitivity)
     errors.read(check_timeout, timeout)
@@ -128,13 +129,13 @@ def evolve(
     errors.raise_errors()
     study, taken = found
     study = resolve_device(study, device)
-    mended = open_folder(out, study, resume=resume)
+    mended = open_folder(place, study, resume=resume)
     notes = [*(note for each in study.scenarios for note in each.notes), *study.notes, taken, mended]
     terminal.print_notes([note for note in notes if note])
     begin = time.perf_counter()
     executor = study_executor(study, scheduler, threads, timeout)
     with run_progress(quiet or as_json) as watch:
-        result = run_study(study, out, executor, watch, sensitivity=sensitivity)
+        result = run_study(study, place, executor, watch, sensitivity=sensitivity)
     if as_json:
         terminal.print_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
     elif not quiet:
@@ -283,9 +284,6 @@ def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
 
 def tune(
     ctx: typer.Context,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for all results.", show_default=False)
-    ],
     scenario: Annotated[
         list[str] | None,
         typer.Argument(
@@ -293,6 +291,9 @@ def tune(
             show_default=False,
             help="Your drones, field and speed; or logs, with --like; none to --resume what the folder holds.",
         ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="DIR", help="Folder for all results.", show_default=False)
     ] = None,
     budget: Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 20min or 2h.")] = "20min",
     limit: Annotated[
@@ -340,9 +341,11 @@ def tune(
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
     from airflock.certificates import check_confidence
+    from airflock.runs import run_place
     from airflock.search import load_plan, make_request, tune
 
     errors = options.collect_option_errors(ctx)
+    folder = errors.read(run_place, out)
     seconds = errors.read(options.parse_seconds, budget)
     settings = options.collect_settings(errors, changes, agents, duration)
     if confidence is not None:
@@ -353,7 +356,7 @@ def tune(
         base = options.collect_scenario(errors, place, settings, trust=trust)
         start = errors.read(_tuned_scenario, base, like)
         # with logs it depends on their contents
-        plan = errors.read(load_plan, out, start, resume) if like is None else None
+        plan = errors.read(load_plan, folder, start, resume) if like is None else None
         errors.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
         errors.raise_errors()
         terminal.print_notes(start.notes)
@@ -373,7 +376,7 @@ def tune(
             shown.append(text)
             line.say(text)
 
-        tuning = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
+        tuning = tune(what, folder, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
     if as_json:
         terminal.print_json(tuning.document())
     else:
@@ -387,7 +390,7 @@ def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -
     if like is not None:
         return like
     if len(scenario) != 1 or heard is not None:
-        raise ScenarioError([f"{', '.join(scenario)}: give one scenario to tune; with logs, give --like PRESET"])
+        raise ScenarioError([f"{', '.join(scenario) or 'tune'}: give one scenario to tune; with logs, give --like PRESET"])
     if Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
         raise ScenarioError([f"{scenario[0]}: is not a scenario file (.toml); with logs, give --like PRESET"])
     return scenario[0]

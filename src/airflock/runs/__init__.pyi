@@ -33,6 +33,7 @@ from .folder import (
     read_request as read_request,
     read_toml_file as read_toml_file,
     run_folder as run_folder,
+    run_place as run_place,
     to_toml_values as to_toml_values,
     write_toml_file as write_toml_file,
 )

@@ -30,6 +30,7 @@ from airflock.runs import (
     open_folder,
     open_run,
     read_request,
+    run_place,
     to_toml_values,
     write_toml_file,
 )
@@ -40,12 +41,12 @@ from airflock.search.objectives import Objective, UserFitness
 from airflock.search.search_settings import fast_search_keys as fast_keys
 from airflock.search.study import Study, is_study, load_study, make_study, study_of_request
 from airflock.search.study_result import EvolveResult, draw_study, export
-from airflock.support import AirflockError, ErrorCollector, StudyError, as_error, atomic, expand_path
+from airflock.support import AirflockError, ErrorCollector, StudyError, as_error, atomic
 
 
 def evolve(
-    scenario: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario] | None,
-    out: str | os.PathLike[str],
+    scenario: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario] | None = None,
+    out: str | os.PathLike[str] | None = None,
     *,
     resume: bool = False,
     settings: Mapping[str, Any] | None = None,
@@ -136,7 +137,7 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    folder = expand_path(out)
+    folder = run_place(out)
     errors = ErrorCollector()
     found = errors.read(
         evolve_request,

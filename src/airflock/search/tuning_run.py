@@ -39,6 +39,7 @@ from airflock.runs import (
     held_request,
     open_folder,
     read_request,
+    run_place,
     write_toml_file,
 )
 from airflock.scenarios import Scenario, build_scenario, formats, load, rebuilt, scenario_variant, starting_set
@@ -434,8 +435,8 @@ def _time(seconds: float) -> str:
 
 
 def tune(
-    scenario: Scenario | str | os.PathLike[str] | Paths | None,
-    out: str | os.PathLike[str],
+    scenario: Scenario | str | os.PathLike[str] | Paths | None = None,
+    out: str | os.PathLike[str] | None = None,
     *,
     budget: float = 1200.0,
     limit: Sequence[str] = (),
@@ -505,7 +506,7 @@ def tune(
     airflock.support.errors.ScenarioError: limit 'r_mim<3 at 1%': r_mim: unknown order parameter; did you mean r_min?
     """
     began = time.monotonic()
-    folder = expand_path(out)
+    folder = run_place(out)
     parts = ErrorCollector()  # all of it is refused before anything flies
     parts.read(check_tune_budget, budget)
     if like is not None:
