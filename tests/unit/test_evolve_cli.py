@@ -44,7 +44,8 @@ def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path, request):
     resumed = json.loads(called(*asked, "--resume").stdout)
     assert resumed["parameters"] == found["parameters"] and resumed["fitness"] == found["fitness"]
     bare = called("evolve", NAME, "--resume", "--json", "--out", tmp_path / "a")
-    assert "search.population = 4, search.generations = 2" in bare.stderr and "goes on with what" in bare.stderr
+    note = "search.population = 4 there, 100 now; search.generations = 2 there, 150 now"
+    assert note in bare.stderr and "goes on with what" in bare.stderr
     assert json.loads(bare.stdout)["fitness"] == found["fitness"]
     other = called("evolve", NAME, "--resume", "--population", 6, "--out", tmp_path / "a")
     assert other.returncode == 2 and other.stderr.count("\n") == 1, other.stderr

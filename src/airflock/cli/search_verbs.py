@@ -390,7 +390,8 @@ def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -
     if like is not None:
         return like
     if len(scenario) != 1 or heard is not None:
-        raise ScenarioError([f"{', '.join(scenario) or 'tune'}: give one scenario to tune; with logs, give --like PRESET"])
+        what = ", ".join(scenario) or "tune"
+        raise ScenarioError([f"{what}: give one scenario to tune; with logs, give --like PRESET"])
     if Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
         raise ScenarioError([f"{scenario[0]}: is not a scenario file (.toml); with logs, give --like PRESET"])
     return scenario[0]

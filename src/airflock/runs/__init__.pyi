@@ -27,6 +27,7 @@ from .folder import (
     differences as differences,
     fingerprint as fingerprint,
     held_request as held_request,
+    list_differences as list_differences,
     open_folder as open_folder,
     open_run as open_run,
     program_versions as program_versions,

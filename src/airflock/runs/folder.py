@@ -9,7 +9,7 @@ import os
 import platform
 import re
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -57,13 +57,18 @@ def read_request(folder: Path, kind: str, *, resume: bool | None = None) -> dict
     """
     held = _request(folder, kind)
     if held is not None and resume is False:
-        raise StudyError(f"{folder}: already holds a {kind}; continue it with --resume, or give another --out")
+        raise already_there(folder, kind)
     if held is None and resume:
         raise StudyError(f"{folder}: holds no {kind} to resume ({REQUEST_FILE} is missing)")
     # hidden files: what a process that was killed had begun to write
     if held is None and folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
         raise StudyError(f"{folder}: is not empty and holds no {REQUEST_FILE}; give a new folder")
     return held
+
+
+def already_there(folder: Path, kind: str) -> StudyError:
+    """Return the error for a run that is there, though no `resume` says that it is to go on."""
+    return StudyError(f"{folder}: already holds a {kind}; continue it with --resume, or give another --out")
 
 
 def _request(folder: Path, kind: str) -> dict[str, Any] | None:
@@ -105,15 +110,17 @@ def open_folder(folder: Path, work: Work, *, resume: bool | None = None, also: M
     A fitness of the user's own may have been mended since: flights that are stored are judged by
     it. Returns a note of that, or "". Raises StudyError where the folder holds something else.
     """
-    kind, held = work.kind, read_request(folder, work.kind, resume=resume)
+    kind, held = work.kind, read_request(folder, work.kind, resume=resume or None)
     also = {**work.also, **(also or {})}
     now, note, comment = to_toml_values(work.document()), "", "Written once, when it began."
     if held is not None:
         before = held.pop("also", {})
         changed = differences(held, now)
-        mended = bool(changed) and all(FITNESS_TEXT.match(line) for line in changed)
+        mended = resume is not False and bool(changed) and all(FITNESS_TEXT.match(line) for line in changed)
         if not mended:
             same_or_refuse(folder, held, now, kind)
+        if resume is False:
+            raise already_there(folder, kind)
         also = before | also
         if mended:
             with FlightStore(folder) as store:
@@ -273,13 +280,17 @@ def _shown(value: Any, same: int) -> str:
     return f"{'...' if first else ''}{text[first : first + 54]}{'...' if len(text) > first + 54 else ''}"
 
 
+def list_differences(found: Sequence[str]) -> str:
+    """Return the first few differences in one line."""
+    return "; ".join([*found[:8], *([f"and {len(found) - 8} more"] if len(found) > 8 else [])])
+
+
 def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any], kind: str) -> None:
     """Raise StudyError, naming what differs, if a folder holds another run than the requested one."""
     found = differences(old, new)
     if not found:
         return
-    shown = found[:8] + ([f"and {len(found) - 8} more"] if len(found) > 8 else [])
     # Flights of other rules must not be mixed with those of now, whatever the options say.
     other = any(line.startswith(tuple(f"{key} = " for key in OF_PROGRAM)) for line in found)
     advice = "continue it with the version that began it" if other else "ask for what it holds"
-    raise StudyError(f"{folder}: holds another {kind}: {'; '.join(shown)}; give another --out, or {advice}")
+    raise StudyError(f"{folder}: holds another {kind}: {list_differences(found)}; give another --out, or {advice}")

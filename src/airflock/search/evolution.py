@@ -26,6 +26,7 @@ from airflock.runs import (
     check_worker_device,
     differences,
     held_request,
+    list_differences,
     make_executor,
     open_folder,
     open_run,
@@ -252,7 +253,7 @@ def evolve_request(
         study = study_of_request(held, given, **changes, trust=bool(others.get("trust")))
     study = replace(study, space=given.space) if given is not None and others.get("space") else study
     changed = [] if given is None else differences(to_toml_values(study.document()), to_toml_values(given.document()))
-    return study, f"goes on with what {folder} holds: {'; '.join(changed)}" if changed else ""
+    return study, f"goes on with what {folder} holds: {list_differences(changed)}" if changed else ""
 
 
 def study_from_request(
