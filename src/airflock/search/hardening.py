@@ -550,6 +550,8 @@ def harden(
     ScenarioError
         If the model has no such parameters, the flights have no fitness, the optimum does not fly, or a limit cannot
         be read.
+    StudyError, Interrupted
+        If the folder holds something else, or a flight fails; at Ctrl-C.
 
     Examples
     --------

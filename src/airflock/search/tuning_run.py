@@ -523,7 +523,7 @@ def tune(
         telling = flights_per_event(rated, start)
         plan = make_plan(budget, measure_flight_rate(start, threads), warm=warm, flights_for_limits=telling)
     plan = replace(plan, limits=limits, confidence=campaign.confidence)
-    open_folder(folder, Tuning(start, plan, {"notes": begun.notes}), resume=resume)
+    open_folder(folder, Tuning(start, plan, {"notes": begun.notes, "logs": logs is not None}), resume=resume)
     write_toml_file(folder / START_FILE, scenario_text_document(start), "Where tuning starts.")
     if logs is not None and not (folder / REPORT_FILE).is_file():
         logs.save(folder)
@@ -632,6 +632,8 @@ def _begun(
             name, notes = str(held["name"]), list(held.get("also", {}).get("notes", []))
             start = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
         report = read_report(folder) if (folder / REPORT_FILE).is_file() else None
+        if report is None and held.get("also", {}).get("logs"):  # killed before it was written
+            raise StudyError(f"{folder}: holds nothing of its logs yet; name them again, with --like")
         return _Begun(start, notes, None if report is None else IdentifiedFleet(start, {}, report))
     paths = [what] if isinstance(what, (Scenario, str, os.PathLike)) else list(what)
     if like is None:
