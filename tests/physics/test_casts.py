@@ -15,6 +15,7 @@ from airflock.world.scenes.scene_builder import (
     make_scene,
     scene_of,
     segment_rows,
+    sphere_rows,
     triangle_rows,
 )
 from kernels import compiled
@@ -52,13 +53,15 @@ def alone(rows, *ray, radius=0.0, length=100.0):
 
 
 def mixed(seed=0, count=25):
-    """A scene of all four kinds."""
+    """A scene of all kinds."""
     rng = np.random.default_rng(seed)
     low = rng.uniform(-40.0, 40.0, (count, 3))
     middle = rng.uniform(-40.0, 40.0, (count, 1, 3))
     tubes = np.column_stack([rng.uniform(-40.0, 40.0, (count, 2)), rng.uniform(0.3, 3.0, count), np.zeros(count)])
     ends = rng.uniform(-40.0, 40.0, (count // 4, 2))
+    balls = np.hstack([rng.uniform(-40.0, 40.0, (count, 3)), rng.uniform(0.2, 5.0, (count, 1))])
     return make_scene([
+        sphere_rows(balls),
         box_rows(np.hstack([low, low + rng.uniform(1.0, 8.0, (count, 3))])),
         cylinder_rows(np.column_stack([tubes, rng.uniform(2.0, 20.0, count)])),
         triangle_rows(middle + rng.uniform(-5.0, 5.0, (count, 3, 3))),
@@ -87,6 +90,31 @@ def test_sphere_meets_a_cylinder_where_two_circles_touch():
     )
     assert alone(trunk, 0.0, 0.0, 20.0, 0.0, 0.0, -1.0, radius=0.5) == pytest.approx(9.5, abs=2e-4)
     assert alone(trunk, -8.0, 0.5, 5.0, 1.0, 0.0, 0.0) == pytest.approx(8.0 - math.sqrt(0.75), rel=1e-9)
+
+
+def test_ray_and_sphere_meet_a_ball_where_the_chord_begins():
+    ball = sphere_rows([1.0, 2.0, 3.0, 2.0])
+    for radius in (0.0, 0.5):
+        for offset in (0.0, 1.2, 1.99):
+            chord = math.sqrt((2.0 + radius) ** 2 - offset**2)
+            met = alone(ball, -9.0, 2.0 + offset, 3.0, 1.0, 0.0, 0.0, radius=radius)
+            assert met == pytest.approx(10.0 - chord, abs=5e-4 if radius else 1e-9)
+        assert alone(ball, -9.0, 4.01 + radius, 3.0, 1.0, 0.0, 0.0, radius=radius) == 100.0
+    assert alone(ball, 1.0, 2.0, 3.5, *unit(1.0, 1.0, 0.0)) == 0.0  # from within
+    assert alone(ball, 9.0, 2.0, 3.0, 1.0, 0.0, 0.0) == 100.0  # behind the ray
+
+
+def test_distance_from_a_ball_is_that_from_its_centre_less_the_radius(seed):
+    rng = np.random.default_rng(seed)
+    rows = sphere_rows(np.hstack([rng.normal(0.0, 9.0, (50, 3)), rng.uniform(0.1, 6.0, (50, 1))]))
+    for k, row in enumerate(rows):
+        at = rng.normal(0.0, 9.0, 3)
+        found = shapes.from_shape(*at, rows.tolist(), k)
+        away = at - row[7:10]
+        assert found.distance == pytest.approx(np.linalg.norm(away) - row[10], abs=1e-9)
+        assert [found.nx, found.ny, found.nz] == pytest.approx(away / np.linalg.norm(away), abs=1e-9)
+    centre = shapes.from_shape(*rows[0, 7:10], rows.tolist(), 0)
+    assert centre.distance == pytest.approx(-rows[0, 10], abs=1e-5) and centre.nz == 1.0
 
 
 def test_thin_triangle_stops_a_ray_and_a_sphere_from_both_sides():

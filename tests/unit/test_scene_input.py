@@ -9,11 +9,12 @@ import pytest
 
 import airflock
 from airflock.displays import fly_show, shape_points, show_control as assignment
+from airflock.engine import driver_text, fly_world
 from airflock.support.errors import AirflockError, FlightError, ScenarioError
 from airflock.world.scenery import Parameters
 from airflock.world.scenes import meshes
-from airflock.world.scenes.scene_builder import in_mesh, scene_of
-from airflock.world.shapes import TRIANGLE
+from airflock.world.scenes.scene_builder import SHAPES, in_mesh, scene_of
+from airflock.world.shapes import TRIANGLE, from_shape
 from needed import needed
 
 trimesh = needed("trimesh")
@@ -321,3 +322,52 @@ def test_a_text_with_a_point_in_it_is_still_a_text(monkeypatch, text):
 
     monkeypatch.setattr(shapes, "_pixels_of_text", lambda _: np.ones((50, 50), bool))
     assert shape_points(text, 10).shape == (10, 3)
+
+
+BALLS = {
+    "scene.kind": "boxes", "scene.spheres": [[0.0, 0.0, 20.0, 15.0, 0.0], [40.0, -30.0, 30.0, 12.0, 1.0]], "agents": 6,
+    "scene.boxes": [[50.0, 50.0, 0.0, 60.0, 60.0, 30.0, 0.0]], "goals.kind": "points", "duration": 2.0,
+    "goals.points": [[30.0, 0.0, 20.0], [-40.0, 0.0, 20.0]],
+}  # fmt: skip
+
+
+def test_balls_are_in_the_text_of_a_driver_only_where_they_stand_and_fly_as_in_plain_python():
+    scenario = airflock.load("kidger/city", BALLS)
+    without = airflock.load("kidger/city", {**BALLS, "scene.spheres": []})
+    assert "from_sphere" in driver_text(scenario) and "sphere(" not in driver_text(without).replace("_sphere_to_", "")
+    plain = fly_world(scenario, 5, precision=64, record=True, device="python").frames
+    np.testing.assert_allclose(fly_world(scenario, 5, precision=64, record=True).frames, plain, atol=1e-5)
+    flown = airflock.simulate(scenario, 5, device="python")
+    apart = np.linalg.norm(flown.position.isel(keypoint=0).values - np.array([0.0, 0.0, 20.0])[:, None], axis=1)
+    assert np.nanmin(apart) > 15.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"scene.spheres": [[0.0, 0.0, 20.0, -1.0, 0.0]]}, "its radius is -1 m; give more than 0 m"),
+        ({"scene.spheres": [[0.0, 0.0, 20.0, 1.0]]}, "is not a list of rows of 5 numbers in m and s"),
+        ({"world.dimensions": "2"}, "balls stand beside boxes in space"),
+        ({"scene.kind": "city"}, "balls stand beside boxes in space"),
+        ({"goals.points": [[0.0, 0.0, 20.0]]}, "lies 15 m inside what stands in the scene"),
+    ],
+)
+def test_wrong_balls_are_said_in_one_line(keys, said):
+    with pytest.raises(ScenarioError, match=said):
+        airflock.load("kidger/city", {**BALLS, **keys})
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_shape_is_drawn_within_its_bounds_and_by_triangles_on_its_surface(kind, seed):
+    rng = np.random.default_rng(seed)
+    numbers = {0.0: [0, 0, 0, 2, 3, 4], 1.0: [1, 2, 3, 0, 5], 2.0: rng.normal(size=9), 3.0: [0, 0, 3, 4]}
+    numbers |= {5.0: [1, 2, 3, 4]}
+    shape = SHAPES[kind]
+    (row,) = shape.rows(np.array([numbers[kind]], float))
+    vertices, faces = shape.mesh(row[None])
+    assert faces.max() < len(vertices) and len(faces)
+    plan = shape.plan(row)
+    for points in (vertices, *shape.lines(row), np.column_stack([plan, np.full(len(plan), row[2])])):
+        assert (np.asarray(points) >= row[:3] - 1e-4).all() and (np.asarray(points) <= row[3:6] + 1e-4).all()
+    for vertex in np.asarray(vertices, float):
+        assert abs(from_shape(*vertex, [row.tolist()], 0).distance) < 1e-4

@@ -87,7 +87,7 @@ class PlanProperties:
     noisy     : it errs
     edge      : what happens to a coordinate beyond the arena's faces, if anything
     start     : region in which agents start
-    scene     : something stands in the world that agents see with rays, feel, or must not touch
+    scene     : something stands in the world that agents see with rays, feel, or must not touch; spheres: among it
     goals     : the flock has goals; herd: the goal is a shepherd
     own       : each agent has a goal of its own
     stop      : the flight ends at its first collision
@@ -121,6 +121,7 @@ class PlanProperties:
     edge_rule: Callable[..., Any] | None = None
     start: str = "arena"
     scene: bool = False
+    spheres: bool = False
     has_mesh: bool = False
     goals: bool = False
     stop: bool = False
@@ -563,6 +564,7 @@ def _surroundings(scenario: Scenario) -> dict[str, Any]:
     return {
         "start": scenario.start.kind,
         "scene": scenario.has_scene,
+        "spheres": scenario.scene.kind == "boxes" and bool(scenario.scene.spheres),
         "has_mesh": scenario.scene.kind == "mesh",
         "goals": kind in ("points", "scene"),
         "is_shepherd": kind in ("points", "scene") and scenario.goals.role == "herd",

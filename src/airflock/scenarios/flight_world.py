@@ -59,6 +59,13 @@ def scene_errors(scenario: Scenario, started: bool = False) -> list[str]:
     turned = [k for k, row in enumerate(scenario.scene.boxes) if any(row[c] >= row[c + 3] for c in range(3))]
     if turned:
         return [f"scene.boxes[{k}]: its first corner does not lie below its second in x, y and z" for k in turned]
+    if scenario.scene.spheres and (scenario.scene.kind != "boxes" or scenario.dimensions == 2):
+        return ["scene.spheres: balls stand beside boxes in space; set scene.kind = 'boxes', world.dimensions = '3'"]
+    flat = [k for k, row in enumerate(scenario.scene.spheres) if row[3] <= 0.0]
+    if flat:
+        return [
+            f"scene.spheres[{k}]: its radius is {scenario.scene.spheres[k][3]:g} m; give more than 0 m" for k in flat
+        ]
     try:
         place = scenario.stands()
         points = scenario.waypoints()

@@ -17,8 +17,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from shapely import constrained_delaunay_triangles
-from shapely.geometry import Polygon
 
 from airflock.drones import FlightCard, to_tuples
 from airflock.parts.metrics import scalar_names
@@ -44,14 +42,17 @@ from airflock.view.agent_colours import (
     varied_colours,
     varied_number_units,
 )
-from airflock.world import BOX, CYLINDER, SEGMENT, TRIANGLE, arena, half_sizes, heights_of
+from airflock.world import BOX, CYLINDER, SEGMENT, SHAPES, SPHERE, TRIANGLE, arena, half_sizes, heights_of, prism_mesh
 
 BLOCK_COLOUR = (176, 182, 190)
 TREE_COLOUR = (110, 150, 110)
 OBSTACLE_COLOUR = (213, 94, 0)
 ARENA_COLOUR = (0, 114, 178)
 GOAL_COLOUR = (0, 158, 115)
-CYLINDER_SIDES = 12  # of a drawn cylinder
+SOLIDS = {  # kind of shape → what a page calls all of it, and their colour; walls are those of the world
+    BOX: ("blocks", BLOCK_COLOUR), CYLINDER: ("trees", TREE_COLOUR), SEGMENT: ("walls", OBSTACLE_COLOUR),
+    TRIANGLE: ("mesh", BLOCK_COLOUR), SPHERE: ("balls", BLOCK_COLOUR),
+}  # fmt: skip
 MAX_DRAWN_SIZE = 1e5  # m; what is larger has no drawn end
 
 
@@ -132,73 +133,30 @@ def _drawn_shapes(scenario: Scenario) -> dict[float, NDArray[Any]]:
 def shapes_by_kind(rows: NDArray[Any]) -> dict[float, NDArray[Any]]:
     """Return rows of shapes by their kind; without infinite ones."""
     small = np.abs(rows[:, [0, 1, 3, 4]]).max(axis=1, initial=0.0) < MAX_DRAWN_SIZE if len(rows) else np.zeros(0, bool)
-    return {kind: rows[small & (rows[:, 6] == kind)] for kind in (BOX, CYLINDER, TRIANGLE, SEGMENT)}
+    return {kind: rows[small & (rows[:, 6] == kind)] for kind in SHAPES}
 
 
 def scenery_solids(shapes: dict[float, NDArray[Any]], plane_height: float | None) -> list[SceneSolid]:
     """Return boxes, trees, triangles and walls; in a plane everything is `tall` m high."""
     solids = []
-    boxes = [_box_mesh(*_with_height(row, plane_height)) for row in shapes[BOX]]
-    trunks = []
-    for row in shapes[CYLINDER]:
-        turn = np.linspace(0.0, 2.0 * np.pi, CYLINDER_SIDES, endpoint=False)
-        ring = row[7:9] + row[9] * np.stack([np.cos(turn), np.sin(turn)], 1)
-        bounds = _with_height(row, plane_height)
-        trunks.append(_prism_mesh(ring, bounds[2], bounds[5]))
-    walls = []
-    for row in shapes[SEGMENT]:
-        a, b = row[7:9], row[9:11]
-        walls.append(_prism_mesh(np.array([a, b]), 0.0, plane_height or 10.0))
-    for name, parts, colour in (
-        ("blocks", boxes, BLOCK_COLOUR),
-        ("trees", trunks, TREE_COLOUR),
-        ("walls", walls, OBSTACLE_COLOUR),
-    ):
-        if parts:
-            solids.append(SceneSolid(name, *_joined_meshes(parts), colour))
-    triangles = shapes[TRIANGLE][:, 7:16].reshape(-1, 3)
-    if len(triangles):
-        solids.append(SceneSolid("mesh", triangles, np.arange(len(triangles)).reshape(-1, 3), BLOCK_COLOUR))
+    for kind, (name, colour) in SOLIDS.items():
+        rows = shapes[kind]
+        if len(rows):
+            solids.append(SceneSolid(name, *SHAPES[kind].mesh(_with_heights(kind, rows, plane_height)), colour))
     return solids
 
 
-def _with_height(row: NDArray[Any], plane_height: float | None) -> NDArray[Any]:
-    bounds = np.array(row[:6])
-    if plane_height is not None:
-        bounds[2], bounds[5] = 0.0, plane_height
-    return bounds
-
-
-def _box_mesh(x0: float, y0: float, z0: float, x1: float, y1: float, z1: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    return _prism_mesh(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), z0, z1)
+def _with_heights(kind: float, rows: NDArray[Any], plane_height: float | None) -> NDArray[Any]:
+    """Return rows with the heights that are drawn: in a plane one for all; walls without end are 10 m high."""
+    if kind == SEGMENT or (plane_height is not None and kind in (BOX, CYLINDER)):
+        rows = np.array(rows)
+        rows[:, 2], rows[:, 5] = 0.0, plane_height or 10.0
+    return rows
 
 
 def prism_solid(name: str, corners: NDArray[Any], low: float, high: float, colour: tuple[int, int, int]) -> SceneSolid:
     """Return an upright prism over a ground plan (corner, 2), m."""
-    return SceneSolid(name, *_prism_mesh(corners, low, high), colour)
-
-
-def _prism_mesh(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the sides and the roof over a ground plan."""
-    n = len(corners)
-    vertices = np.array([[x, y, z] for z in (low, high) for x, y in corners], np.float32)
-    faces = [t for i in range(n) for t in ((i, (i + 1) % n, n + i), ((i + 1) % n, n + (i + 1) % n, n + i))]
-    faces += [(n + a, n + b, n + c) for a, b, c in _roof_triangles(corners)]
-    return vertices, np.array(faces, np.uint32)
-
-
-def _roof_triangles(corners: NDArray[Any]) -> list[tuple[int, int, int]]:
-    """Return triangles that fill a simple polygon, by the numbers of its corners."""
-    place = {(float(x), float(y)): number for number, (x, y) in enumerate(corners)}
-    triangles = constrained_delaunay_triangles(Polygon(corners)).geoms
-    return [tuple(place[corner] for corner in triangle.exterior.coords[:3]) for triangle in triangles]  # type: ignore[misc]
-
-
-def _joined_meshes(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Join many solids to one."""
-    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
-    faces = np.vstack([part[1] + offset for part, offset in zip(parts, offsets, strict=True)])
-    return np.vstack([part[0] for part in parts]), faces.astype(np.uint32)
+    return SceneSolid(name, *prism_mesh(corners, low, high), colour)
 
 
 def prism_edges(corners: NDArray[Any], low: float, high: float) -> NDArray[Any]:

@@ -32,7 +32,7 @@ from airflock.view.flight_paths import (  # fmt: skip
     world_or_open,  # fmt: skip
 )
 from airflock.view.law_vectors import CastRay, rays_and_command
-from airflock.world import BOX, CYLINDER, SEGMENT, TRIANGLE, arena
+from airflock.world import BOX, CYLINDER, SEGMENT, SHAPES, SPHERE, TRIANGLE, arena
 
 SCENERY_MARGIN = 40.0  # m of scenery shown around the paths
 MAX_SHAPES = 4000  # shapes drawn in space
@@ -156,18 +156,18 @@ def shapes_near_paths(scenario: Scenario, paths: FlightPaths) -> NDArray[np.floa
     shapes = scenario.stands().shapes
     low, high = _around(paths)
     inside = (shapes[:, 3:5] > low).all(axis=1) & (shapes[:, :2] < high).all(axis=1)
-    return np.asarray(shapes[inside & np.isin(shapes[:, 6], (BOX, CYLINDER, SEGMENT, TRIANGLE))])
+    return np.asarray(shapes[inside & np.isin(shapes[:, 6], [*SHAPES])])
 
 
 def draw_ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None:
     """Draw ground plans, higher solids darker. Return the mappable of a colour bar of heights (m), or None."""
     solid = None
-    boxes, trunks = rows[rows[:, 6] == BOX], rows[rows[:, 6] == CYLINDER]
+    boxes, trunks, balls = (rows[rows[:, 6] == kind] for kind in (BOX, CYLINDER, SPHERE))
     patches: list[Any] = [Rectangle((r[0], r[1]), r[3] - r[0], r[4] - r[1]) for r in boxes]
-    patches += [Circle((r[7], r[8]), r[9]) for r in trunks]
+    patches += [Circle((r[7], r[8]), r[9]) for r in trunks] + [Circle((r[7], r[8]), r[10]) for r in balls]
     if patches:
         # Infinite shapes would take the whole range of greys.
-        height = np.minimum(np.concatenate([boxes[:, 5], trunks[:, 5]]), 1000.0)
+        height = np.minimum(np.concatenate([boxes[:, 5], trunks[:, 5], balls[:, 5]]), 1000.0)
         grey = Normalize(0.0, max(float(height.max()), 1.0))
         solid = PatchCollection(
             patches, cmap=HEIGHT_COLOURS, norm=grey, edgecolors=style.GREY, linewidths=0.3, zorder=1
@@ -175,7 +175,7 @@ def draw_ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection |
         solid.set_array(height)
         axes.add_collection(solid)
     walls, faces = rows[rows[:, 6] == SEGMENT], rows[rows[:, 6] == TRIANGLE]
-    lines = [outline_from_above(row) for row in (*walls, *faces)]
+    lines = [SHAPES[row[6]].plan(row) for row in (*walls, *faces)]
     if lines:
         axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.8, zorder=1))
     return solid
@@ -186,38 +186,15 @@ def draw_outlines(axes: Any, rows: NDArray[np.float64], view: Projection) -> Non
     lines = [np.column_stack(view(line)) for line in outlines_in_space(rows)]
     axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.5, alpha=0.7, zorder=1), autolim=False)
     upright = rows[np.isin(rows[:, 6], (BOX, CYLINDER))]
-    rings = [(outline_from_above(row), row[5]) for row in upright[:MAX_SHAPES]]
+    rings = [(SHAPES[row[6]].plan(row), row[5]) for row in upright[:MAX_SHAPES]]
     roofs = [np.column_stack(view(np.column_stack([ring, np.full(len(ring), top)]))) for ring, top in rings]
     axes.add_collection(PolyCollection(roofs, facecolors=style.PALE_GREY, alpha=0.6, zorder=1), autolim=False)
 
 
 def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Return edges of boxes and triangles, rims and four uprights of cylinders, as lines (point, 3) in m.
-
-    Segments are left out: they are the plans of the world's own walls, which `walls` gives with
-    their heights.
-    """
-    lines: list[NDArray[np.float64]] = []
-    for r in rows[rows[:, 6] != SEGMENT][:MAX_SHAPES]:
-        if r[6] == TRIANGLE:
-            lines.append(r[[7, 8, 9, 10, 11, 12, 13, 14, 15, 7, 8, 9]].reshape(4, 3))
-            continue
-        ring = outline_from_above(r)
-        lines += [np.column_stack([ring, np.full(len(ring), z)]) for z in (r[2], r[5])]
-        lines += [np.array([[*p, r[2]], [*p, r[5]]]) for p in ring[: -1 : 3 if r[6] == CYLINDER else 1]]
-    return lines
-
-
-def outline_from_above(row: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the ground plan of a shape as a line (point, 2), m."""
-    if row[6] == CYLINDER:
-        turn = np.linspace(0.0, 2.0 * np.pi, 13)
-        return np.column_stack([row[7] + row[9] * np.cos(turn), row[8] + row[9] * np.sin(turn)])
-    if row[6] == SEGMENT:
-        return np.asarray(row[7:11].reshape(2, 2))
-    if row[6] == TRIANGLE:
-        return np.asarray(row[[7, 8, 10, 11, 13, 14, 7, 8]].reshape(4, 2))
-    return np.array([[row[0], row[1]], [row[3], row[1]], [row[3], row[4]], [row[0], row[4]], [row[0], row[1]]])
+    """Return edges of shapes, as lines (point, 3) in m."""
+    drawn = rows[rows[:, 6] != SEGMENT][:MAX_SHAPES]
+    return [line for row in drawn for line in SHAPES[row[6]].lines(row)]
 
 
 def scenery_lines(recording: xr.Dataset, paths: FlightPaths) -> list[NDArray[np.float64]]:
@@ -226,7 +203,7 @@ def scenery_lines(recording: xr.Dataset, paths: FlightPaths) -> list[NDArray[np.
     if scenario is None or scenario.scene.kind == "none":
         return []
     rows = shapes_near_paths(scenario, paths)
-    return outlines_in_space(rows) if paths.position.shape[1] == 3 else [outline_from_above(r) for r in rows]
+    return outlines_in_space(rows) if paths.position.shape[1] == 3 else [SHAPES[r[6]].plan(r) for r in rows]
 
 
 def _paths(axes: Any, paths: FlightPaths, scale: Normalize) -> None:

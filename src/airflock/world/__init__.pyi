@@ -10,6 +10,7 @@ from . import (
     start as start,
 )
 from .arena import heights_of as heights_of
+from .casts import WITHOUT_SPHERES as WITHOUT_SPHERES
 from .edges import (
     nearest_image as nearest_image,
     wrap as wrap,
@@ -22,10 +23,12 @@ from .scenes.field_outlines import load_field as load_field
 from .scenes.meshes import read_mesh as read_mesh
 from .scenes.scene_builder import (
     FAR_AWAY as FAR_AWAY,
+    SHAPES as SHAPES,
     Scene as Scene,
     clearance as clearance,
     in_mesh as in_mesh,
     make_scene as make_scene,
+    prism_mesh as prism_mesh,
     scene_of as scene_of,
     waypoints as waypoints,
     without_appearing as without_appearing,
@@ -36,6 +39,7 @@ from .shapes import (
     CYLINDER as CYLINDER,
     GROUND as GROUND,
     SEGMENT as SEGMENT,
+    SPHERE as SPHERE,
     TRIANGLE as TRIANGLE,
 )
 from .world_map import (

@@ -8,7 +8,7 @@ again. FAR means that nothing is met.
 import math
 
 from airflock.core import FAR, TINY
-from airflock.world.shapes import BOX, CYLINDER, GROUND, TRIANGLE, from_shape
+from airflock.world.shapes import BOX, CYLINDER, GROUND, SPHERE, TRIANGLE, from_edged_shape, from_shape
 
 SKIN = 1e-4  # m; a sphere as near as this has met a shape: below what positions resolve in single precision
 STEPS = 32  # of the search for the point of contact; each at least doubles the digits, except where a sphere grazes
@@ -96,8 +96,25 @@ def ray_to_triangle(x, y, z, ux, uy, uz, ax, ay, az, bx, by, bz, cx, cy, cz):
     return t / bound if (t >= 0.0) & (s >= slack) & (r >= slack) & (s + r <= bound - slack) else FAR
 
 
-def ray_to_shape(x, y, z, ux, uy, uz, shapes, k, start):
-    """Distance (m) along a ray to row k of the shapes; start is where it enters the bounds."""
+def ray_to_sphere(x, y, z, ux, uy, uz, cx, cy, cz, radius):
+    """Distance (m) along a ray to a solid sphere."""
+    px = cx - x
+    py = cy - y
+    pz = cz - z
+    along = px * ux + py * uy + pz * uz
+    # Across the ray from the centre, by the cross product: no cancellation far away.
+    ax = py * uz - pz * uy
+    ay = pz * ux - px * uz
+    az = px * uy - py * ux
+    root = radius * radius - (ax * ax + ay * ay + az * az)
+    if root < 0.0:
+        return FAR
+    half = math.sqrt(root + TINY)
+    return max(along - half, 0.0) if along + half >= 0.0 else FAR
+
+
+def ray_to_edged_shape(x, y, z, ux, uy, uz, shapes, k, start):
+    """Distance (m) along a ray to row k of the shapes, which is no sphere; start is where it enters the bounds."""
     kind = shapes[k][6]
     if (kind == BOX) | (kind == GROUND):
         return start
@@ -111,6 +128,18 @@ def ray_to_shape(x, y, z, ux, uy, uz, shapes, k, start):
             shapes[k][13], shapes[k][14], shapes[k][15],
         )  # fmt: skip
     return ray_to_segment(x, y, ux, uy, shapes[k][7], shapes[k][8], shapes[k][9], shapes[k][10])
+
+
+def ray_to_shape(x, y, z, ux, uy, uz, shapes, k, start):
+    """Distance (m) along a ray to row k of the shapes, also to a sphere; start is where it enters the bounds."""
+    if shapes[k][6] == SPHERE:
+        return ray_to_sphere(x, y, z, ux, uy, uz, shapes[k][7], shapes[k][8], shapes[k][9], shapes[k][10])
+    return ray_to_edged_shape(x, y, z, ux, uy, uz, shapes, k, start)
+
+
+# Rules of all shapes → those without spheres, which drivers have where no sphere stands: a test more
+# for each shape that is looked at would cost every flight in a city.
+WITHOUT_SPHERES = {from_shape: from_edged_shape, ray_to_shape: ray_to_edged_shape}
 
 
 def sphere_to_shape(x, y, z, ux, uy, uz, shapes, k, start, best, radius):

@@ -47,6 +47,12 @@ class Parameters(Record):
     boxes: tuple[tuple[float, ...], ...] = points(
         "m and s", 2, axes=7, meaning="boxes: lowest and highest corner, and when it appears: [x, y, z, x, y, z, time]"
     )
+    spheres: tuple[tuple[float, ...], ...] = points(
+        "m and s",
+        2,
+        axes=5,
+        meaning="boxes: balls beside them: centre, radius, and when it appears: [x, y, z, r, time]",
+    )
     file: str = text(meaning="mesh: file of triangles (glTF, OBJ, STL and others), beside the scenario or absolute")
     unit: float = quantity(1.0, "m", low=1e-6, high=1e6, meaning="mesh: length of one unit of the file")
     up: str = choice(

@@ -1,11 +1,11 @@
-"""Shapes of a scene as rows of numbers: boxes, upright cylinders, triangles and upright segments; distances to them.
+"""Shapes of a scene as rows of numbers: boxes, cylinders, triangles, upright segments, spheres; distances to them.
 
 A row has 18 columns: bounds x0 y0 z0 x1 y1 z1 (m), the kind, up to nine numbers of the kind, the
 time (s) at which the shape appears, and 1.0 if it is part of a surface that closes around an
 inside. Numbers of the kinds: box and ground (none: the bounds say all), cylinder (x, y, radius),
 triangle (ax ay az bx by bz cx cy cz), segment (ax ay bx by): the ground plan of a wall without end
-in height. Distances are exact: signed for the solids (negative within), unsigned for triangles and
-segments. All shapes are convex, so a distance along a straight line is convex too.
+in height, sphere (x y z radius). Distances are exact: signed for the solids (negative within),
+unsigned for triangles and segments. All shapes are convex, so a distance along a straight line is convex too.
 """
 
 import math
@@ -17,6 +17,7 @@ BOX = 0.0
 CYLINDER = 1.0
 TRIANGLE = 2.0
 SEGMENT = 3.0
+SPHERE = 5.0
 GROUND = 4.0  # a box that is the ground, so that it can be told from what stands on it
 APPEARS = 16  # column of the time, s
 CLOSED = 17  # column of 1.0 if the shape is part of a closed surface
@@ -138,8 +139,19 @@ def from_triangle(x, y, z, ax, ay, az, bx, by, bz, cx, cy, cz):
     return Surface(d, qx / d, qy / d, qz / d)
 
 
-def from_shape(x, y, z, shapes, k):
-    """Distance (m) from row k of the shapes, and the unit vector away from its nearest point."""
+def from_sphere(x, y, z, cx, cy, cz, radius):
+    """Distance (m) from a solid sphere, and the unit vector away from its centre; upwards at the centre itself."""
+    dx = x - cx
+    dy = y - cy
+    dz = z - cz
+    d = math.sqrt(dx * dx + dy * dy + dz * dz + TINY)
+    if d < 2e-6:
+        return Surface(-radius, 0.0, 0.0, 1.0)
+    return Surface(d - radius, dx / d, dy / d, dz / d)
+
+
+def from_edged_shape(x, y, z, shapes, k):
+    """Distance (m) from row k of the shapes, which is no sphere, and the unit vector away from its nearest point."""
     kind = shapes[k][6]
     if (kind == BOX) | (kind == GROUND):
         return from_box(x, y, z, shapes[k][0], shapes[k][1], shapes[k][2], shapes[k][3], shapes[k][4], shapes[k][5])
@@ -151,3 +163,10 @@ def from_shape(x, y, z, shapes, k):
             shapes[k][13], shapes[k][14], shapes[k][15],
         )  # fmt: skip
     return from_segment(x, y, shapes[k][7], shapes[k][8], shapes[k][9], shapes[k][10])
+
+
+def from_shape(x, y, z, shapes, k):
+    """Distance (m) from row k of the shapes, and the unit vector away from its nearest point; also of a sphere."""
+    if shapes[k][6] == SPHERE:
+        return from_sphere(x, y, z, shapes[k][7], shapes[k][8], shapes[k][9], shapes[k][10])
+    return from_edged_shape(x, y, z, shapes, k)

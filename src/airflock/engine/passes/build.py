@@ -13,6 +13,7 @@ from airflock.engine.specialise.known_values import StageFunction
 from airflock.engine.stages.state import FAULT_PREFIX, NUMBER_PREFIX, SCENE_ARRAYS
 from airflock.engine.text.generate import DriverSource
 from airflock.engine.text.rewrite import law_suffix
+from airflock.world import WITHOUT_SPHERES
 
 JIT_DECORATOR = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"
@@ -47,7 +48,7 @@ class Builder:
 
     def __init__(self, plan: Plan):
         self.plan = plan
-        self.source = DriverSource(JIT_DECORATOR, plan.constants, plan.vectors)
+        self.source = DriverSource(JIT_DECORATOR, plan.constants, plan.vectors, {} if plan.spheres else WITHOUT_SPHERES)
         self.first: dict[str, int] = {}
         self.last: dict[str, int] = {}
         self.functions: list[str] = []

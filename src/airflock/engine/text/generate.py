@@ -30,6 +30,7 @@ class DriverSource:
     decorator : line put above each function
     constants : for each record name (p, b, q, ...) its choices and usual numbers, inlined as constants
     vectors   : for each record name its vectors, with how many components each has
+    shorter   : general rules → those that do the same in this driver, in less; they have the names of the general ones
     rows      : fields of each record that is made of a row of numbers, by its name
     lenient   : whether rules may call what only plain Python has, such as breakpoint() and print()
     """
@@ -41,7 +42,9 @@ class DriverSource:
         decorator: str,
         constants: Mapping[str, Mapping[str, str | float]],
         vectors: Mapping[str, Mapping[str, int]] = NONE,
+        shorter: Mapping[Any, Any] | None = None,
     ):
+        self.shorter = shorter or {}
         self.decorator = decorator
         self.constants = constants
         self.vectors = vectors
@@ -86,6 +89,7 @@ class DriverSource:
             name = f"{base}{count}"
         self._names[key] = name
         self._taken.add(name)
+        item = self.shorter.get(item, item)
         if not chosen:
             self._originals[name] = item
         if isinstance(item, type):

@@ -1,17 +1,34 @@
 """The scene of a scenario, and the goals in it: made once, kept as arrays."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airflock.support import SceneError
 from airflock.world import bvh, goals, scenery
+from airflock.world.casts import ray_to_cylinder, ray_to_segment, ray_to_sphere, ray_to_triangle
 from airflock.world.inside import inside
-from airflock.world.shapes import APPEARS, BOX, CLOSED, COLUMNS, CYLINDER, GROUND, SEGMENT, TRIANGLE
+from airflock.world.shapes import (
+    APPEARS,
+    BOX,
+    CLOSED,
+    COLUMNS,
+    CYLINDER,
+    GROUND,
+    SEGMENT,
+    SPHERE,
+    TRIANGLE,
+    from_box,
+    from_cylinder,
+    from_segment,
+    from_sphere,
+    from_triangle,
+)
 
 FAR_AWAY = 1e9  # m; where the bounds of a shape lie that is not there yet
 LEAF = 4  # shapes of a leaf
@@ -89,6 +106,120 @@ def segment_rows(ends: Any) -> NDArray[np.float64]:
     high = np.maximum(given[:, :2], given[:, 2:])
     bounds = np.column_stack([low, -tall, high, tall])
     return _rows(SEGMENT, bounds, given)
+
+
+def sphere_rows(values: Any) -> NDArray[np.float64]:
+    """Rows of spheres from (sphere, 4) x y z radius, m."""
+    given = np.asarray(values, float).reshape(-1, 4)
+    bounds = np.concatenate([given[:, :3] - given[:, 3:], given[:, :3] + given[:, 3:]], axis=1)
+    return _rows(SPHERE, bounds, given)
+
+
+SIDES = 12  # of a drawn circle
+
+
+class Shape(NamedTuple):
+    """A kind of shape: how drivers measure it, and how it is drawn. Rows are those of `world.shapes`.
+
+    rows     : its numbers → rows with their bounds
+    distance : scalar rule: position (m) and numbers → distance (m) and the unit vector away
+    ray      : scalar rule: position (m), direction and numbers → distance (m); None where the bounds say all
+    plan     : row → ground plan, a line (point, 2), m
+    lines    : row → edges in space, lines (point, 3), m
+    mesh     : rows → vertices (vertex, 3), m, and triangles (face, 3) of all of them together
+    """
+
+    rows: Callable[[Any], NDArray[np.float64]]
+    distance: Callable[..., Any]
+    ray: Callable[..., float] | None
+    plan: Callable[[NDArray[Any]], NDArray[np.float64]]
+    lines: Callable[[NDArray[Any]], list[NDArray[np.float64]]]
+    mesh: Callable[[NDArray[Any]], tuple[NDArray[Any], NDArray[Any]]]
+
+
+def _rectangle(row: NDArray[Any]) -> NDArray[np.float64]:
+    x0, y0, _, x1, y1 = row[:5]
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+
+
+def _circle(x: float, y: float, radius: float) -> NDArray[np.float64]:
+    turn = np.linspace(0.0, 2.0 * np.pi, SIDES + 1)
+    return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
+
+
+def _upright(plan: NDArray[np.float64], row: NDArray[Any], every: int) -> list[NDArray[np.float64]]:
+    """Return both rims of an upright solid over a closed plan, and some uprights between them."""
+    rims = [np.column_stack([plan, np.full(len(plan), z)]) for z in (row[2], row[5])]
+    return rims + [np.array([[*p, row[2]], [*p, row[5]]]) for p in plan[:-1:every]]
+
+
+def prism_mesh(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return vertices and triangles of the sides and the roof over a simple ground plan (corner, 2), m."""
+    from shapely import constrained_delaunay_triangles  # here, because most worlds are not drawn
+    from shapely.geometry import Polygon
+
+    n = len(corners)
+    vertices = np.array([[x, y, z] for z in (low, high) for x, y in corners], np.float32)
+    faces = [t for i in range(n) for t in ((i, (i + 1) % n, n + i), ((i + 1) % n, n + (i + 1) % n, n + i))]
+    place = {(float(x), float(y)): n + number for number, (x, y) in enumerate(corners)}
+    roof = constrained_delaunay_triangles(Polygon(corners)).geoms if n > 2 else ()
+    faces += [tuple(place[corner] for corner in part.exterior.coords[:3]) for part in roof]  # type: ignore[misc]
+    return vertices, np.array(faces, np.uint32)
+
+
+def _sphere_lines(row: NDArray[Any]) -> list[NDArray[np.float64]]:
+    """Return three great circles."""
+    circle, still = _circle(0.0, 0.0, row[10]), np.zeros(SIDES + 1)
+    u, v = circle.T
+    return [row[7:10] + np.column_stack(axes) for axes in ((u, v, still), (u, still, v), (still, u, v))]
+
+
+def _sphere_mesh(row: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    rings = np.linspace(-0.5 * np.pi, 0.5 * np.pi, SIDES // 2 + 1)
+    ring = _circle(0.0, 0.0, 1.0)[:-1]
+    points = [np.column_stack([ring * math.cos(a), np.full(SIDES, math.sin(a))]) for a in rings]
+    vertices = (row[7:10] + row[10] * np.concatenate(points)).astype(np.float32)
+    first = [(k * SIDES + i, k * SIDES + (i + 1) % SIDES) for k in range(len(rings) - 1) for i in range(SIDES)]
+    faces = [face for a, b in first for face in ((a, b, a + SIDES), (b, b + SIDES, a + SIDES))]
+    return vertices, np.array(faces, np.uint32)
+
+
+def _corners(row: NDArray[Any]) -> NDArray[np.float64]:
+    return np.asarray(row[7:16].reshape(3, 3))
+
+
+def _joined(parts: Sequence[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Join the meshes of many solids to one."""
+    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    faces = np.vstack([part[1] + offset for part, offset in zip(parts, offsets, strict=True)])
+    return np.vstack([part[0] for part in parts]), faces.astype(np.uint32)
+
+
+SHAPES: dict[float, Shape] = {
+    BOX: Shape(
+        box_rows, from_box, None, _rectangle, lambda row: _upright(_rectangle(row), row, 1),
+        lambda rows: _joined([prism_mesh(_rectangle(row)[:-1], row[2], row[5]) for row in rows]),
+    ),
+    CYLINDER: Shape(
+        cylinder_rows, from_cylinder, ray_to_cylinder, lambda row: _circle(*row[7:10]),
+        lambda row: _upright(_circle(*row[7:10]), row, 3),
+        lambda rows: _joined([prism_mesh(_circle(*row[7:10])[:-1], row[2], row[5]) for row in rows]),
+    ),
+    TRIANGLE: Shape(
+        triangle_rows, from_triangle, ray_to_triangle, lambda row: _corners(row)[[0, 1, 2, 0], :2],
+        lambda row: [_corners(row)[[0, 1, 2, 0]]],
+        lambda rows: (rows[:, 7:16].reshape(-1, 3), np.arange(3 * len(rows)).reshape(-1, 3)),
+    ),
+    # The plans of the world's own walls, whose heights the arena knows: no lines in space.
+    SEGMENT: Shape(
+        segment_rows, from_segment, ray_to_segment, lambda row: np.asarray(row[7:11].reshape(2, 2)), lambda row: [],
+        lambda rows: _joined([prism_mesh(row[7:11].reshape(2, 2), row[2], row[5]) for row in rows]),
+    ),
+    SPHERE: Shape(
+        sphere_rows, from_sphere, ray_to_sphere, lambda row: _circle(row[7], row[8], row[10]), _sphere_lines,
+        lambda rows: _joined([_sphere_mesh(row) for row in rows]),
+    ),
+}  # fmt: skip
 
 
 def make_scene(rows: Sequence[NDArray[np.float64]], notes: tuple[str, ...] = ()) -> Scene:
@@ -239,6 +370,9 @@ def scene_of(
         given = np.array(p.boxes, float).reshape(-1, 7)
         rows = box_rows(given[:, :6])
         rows[:, APPEARS] = given[:, 6]
+        balls = np.array(p.spheres, float).reshape(-1, 5)
+        rows = np.concatenate([rows, sphere_rows(balls[:, :4])])
+        rows[len(given) :, APPEARS] = balls[:, 4]
     else:
         rows = buildings(p) if p.kind == "city" else trees(p)
         rows[:, APPEARS] = appearance_times(p, len(rows))
