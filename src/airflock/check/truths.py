@@ -185,7 +185,8 @@ def rescaled(record: Any, units: UnitScale) -> Any:
     made = copy.copy(record)
     for name, declared, _ in declarations(record):
         value = getattr(record, name)
-        if isinstance(declared, Quantity) and value is not None:
+        # A number at the upper end of its range stands for no limit, in any unit.
+        if isinstance(declared, Quantity) and value is not None and value != declared.high:
             object.__setattr__(made, name, value * unit_factor(declared.unit, units))
         elif isinstance(declared, Points):
             object.__setattr__(made, name, _points(value, declared.unit, units))
