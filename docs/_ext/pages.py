@@ -332,29 +332,36 @@ def commands() -> None:
     """Every command with its options, and the function that does the same."""
     import typer.main
 
-    from airflock.cli.counterparts import COUNTERPARTS
+    from airflock.cli.command import VERBS
     from airflock.cli.main import app
+    from airflock.cli.options import read_declaration
 
     group = typer.main.get_command(app)
+    calls = {
+        name: f"`{verb.function}({', '.join(read_declaration(verb.function).required)})`"
+        for name, verb in VERBS.items()
+        if verb.function
+    }
     pieces = [
         "# Commands and functions\n\nEvery command has a Python function that does the same; its options are the "
         "function's arguments.\n\n",
-        table(("command", "in Python"), ((f"[`airflock {n}`](#{n})", f"`{c.call}`") for n, c in COUNTERPARTS.items())),
+        table(("command", "in Python"), ((f"[`airflock {name}`](#{name})", call) for name, call in calls.items())),
     ]
     listed = dict(group.commands)  # type: ignore[attr-defined]
     for name, command in group.commands.items():  # type: ignore[attr-defined]
         inner = {key: found for key, found in getattr(command, "commands", {}).items() if not found.hidden}
         listed |= {f"{name} {key}": found for key, found in inner.items()}
     for name, command in sorted(listed.items()):
-        options = COUNTERPARTS[name].options if name in COUNTERPARTS else {}
         pieces.append(f"\n({name.replace(' ', '-')})=\n## {name}\n\n{_help(command.help or '')}\n\n")
+        arguments = read_declaration(VERBS[name].function).arguments if name in calls else ()
         rows = []
         for option in command.params:
             named = option.opts[0].startswith("-")
             flag = ", ".join(f"`{text}`" for text in option.opts) if named else f"`{option.metavar or option.name}`"
-            about = options.get(option.name, "")
-            argument = f"`{about}`" if about.isidentifier() or "airflock." in about else plain(about)
-            rows.append((flag, _help(getattr(option, "help", "") or ""), argument))
+            origin = VERBS[name].options[option.name].origin
+            python = option.name if option.name in arguments else origin.partition(": ")[0]
+            about = "–" if python.startswith("airflock.cli") else f"`{python}`"
+            rows.append((flag, _help(getattr(option, "help", "") or ""), about))
         pieces.append(table(("option", "meaning", "in Python"), rows) if rows else "")
     put("commands.md", "".join(pieces))
 

@@ -33,6 +33,13 @@ def _plain(value: Any) -> Any:
     return repr(value) if isinstance(value, float) else str(value)
 
 
+def _written(parameter: Any) -> str:
+    """Return what a person writes for an option, or the name of an argument in the help."""
+    if parameter.param_type_name == "argument":
+        return str(parameter.metavar)
+    return max(parameter.opts, key=len)
+
+
 def _parameter(parameter: Any) -> dict[str, Any]:
     """Return the plain data of one option or argument."""
     return {
@@ -61,8 +68,8 @@ def _verbs(command: Any, name: str) -> dict[str, Any]:
             "help": text.splitlines(),
             "examples": [line.strip() for line in text.splitlines() if "airflock " in line],
             "epilog": command.epilog,
-            "parameters": {each.name: _parameter(each) for each in command.params},
-            "order": [each.name for each in command.params],
+            "parameters": {_written(each): _parameter(each) for each in command.params},
+            "order": [_written(each) for each in command.params],
             "verbs": list(getattr(command, "commands", {})),
         }
     }

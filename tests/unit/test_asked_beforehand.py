@@ -133,10 +133,12 @@ def test_all_faults_of_a_display_are_told_together(grounded):
 
 def test_the_table_of_a_display_fits_80_columns(monkeypatch, capsys):
     from airflock.cli import flight_verbs
+    from airflock.displays.show_control import ShapeReport
 
     monkeypatch.setenv("COLUMNS", "80")
-    row = {"shape": "pictures/of/a/heart.png", "time": 123.456, "error": 0.0283456, "worst": 0.123456, "drones": 2000}
-    flight_verbs._print_display([{**row, "collisions": 1234, "hulls": 123, "struck": 12, "reassigned": 10}] * 2)
+    formed = ShapeReport(123.456, 0.0283456, 0.123456, 2000, 1234, 12, 123, 10, 3)
+    row = {"shape": "pictures/of/a/heart.png", **vars(formed)}  # as the command makes it
+    flight_verbs._print_display([row] * 2)
     told = capsys.readouterr().out
     assert "…" not in told and max(map(len, told.splitlines())) <= 80
     for number in ("123.5", "0.02835", "0.1235", "2000", "1234", "123", "12", "10"):

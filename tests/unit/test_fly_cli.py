@@ -346,7 +346,7 @@ def test_how_a_fleet_flies_is_checked_at_once(airflock, tmp_path):
     wrong = ["--mode", "procs", "--body", "quad", "--vehicle", "px5", "--faults", "wrong.toml"]
     code, _, lines = airflock("fleet", REAL, *wrong, "--agents", 2)
     assert code == 2 and len(lines) == 4
-    told = ("kind = 'los' is none of", "px4, ardupilot", "multirotor, quadrotor", "lockstep, tasks, processes")
+    told = ("px4, ardupilot", "multirotor, quadrotor", "lockstep, tasks, processes", "kind = 'los' is none of")
     for line, part in zip(lines, told, strict=True):
         assert part in line
     (tmp_path / "wakes.toml").write_text('[[fault]]\nkind = "node"\nend = 5\n')

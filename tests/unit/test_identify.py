@@ -634,10 +634,10 @@ def test_logs_without_commands_say_so_and_write_nothing(tmp_path):
 
 
 def test_the_table_says_where_each_number_is_from(capsys):
-    from airflock.cli.estimate_verbs import _parameter_table
+    from airflock.cli.terminal import print_result
 
     logs, _ = fly(0.5, 4.0, 0.05, 0.05, drones=2)
-    _parameter_table(identify(logs, "vasarhelyi_2018/real_6ms"))
+    print_result(identify(logs, "vasarhelyi_2018/real_6ms"))
     told = capsys.readouterr().out
     assert "from" in told and " rows, " in told and "radio.delay, radio.near" in told
 

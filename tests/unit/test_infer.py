@@ -421,14 +421,15 @@ def test_the_command_says_all_that_is_wrong_in_lines(tmp_path, monkeypatch):
 
 
 def test_json_holds_what_the_table_says(capsys):
-    from airflock.cli.estimate_verbs import _inferred_json, _law_table
+    from airflock.cli.estimate_verbs import _inferred_json
+    from airflock.cli.terminal import print_result
 
     scale = tracks_scale([tracks_from_recording(vicsek(frames=130))])
     laws = [LawResult("a", 1.0, 2.0, 0.5, 20.0, 3.0, 0.9, float("nan"), {}, None, None, None, np.zeros(3))]
     found = InferResult(laws, None, "none", 10, (5, 9), scale, 10)
     plain = json.loads(json.dumps(_inferred_json(found)))
     assert plain["best"] is None and plain["laws"][0]["gain"] == 1.0 and plain["frames"] == {"fitted": 5, "all": 9}
-    _law_table(found)
+    print_result(found)
     (line,) = (line.split() for line in capsys.readouterr().out.splitlines() if line.split()[:1] == ["a"])
     assert line == ["a", "1", "±", "2", "50%", "3", "90.0%", "nan%", "0"]
 

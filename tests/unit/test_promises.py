@@ -34,7 +34,7 @@ def calls(path):
 
 def problem(words):
     """What is wrong with a call; empty if nothing is."""
-    if len(words) < 2 or words[1] in ("--help", "--version", "VERB"):
+    if len(words) < 2 or words[1] in ("--help", "--version", "--show-completion", "VERB"):
         return ""
     command = COMMANDS.get(words[1])
     if command is None:

@@ -1,17 +1,21 @@
 """Public functions: typed, each argument and the result told; commands and functions match."""
 
+import importlib
 import inspect
+import json
 import re
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
-from pkgutil import resolve_name
 
 import pytest
 import typer.main
 
 import airflock
-from airflock.cli.counterparts import COUNTERPARTS, LIBRARY_FUNCTIONS
+from airflock.cli.command import VERBS
 from airflock.cli.main import app
+from airflock.cli.options import ALIASES, SHARED, read_declaration
 
 PACKAGES = {"plots", "measures"}
 CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
@@ -23,6 +27,12 @@ HOMES = {
     "fleet": "airflock.fleets.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
+# public functions that no command is: they are what a program does between two of them
+LIBRARY_FUNCTIONS = {
+    "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "presets", "model",
+    "body", "fault", "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric",
+    "check_sensor", "check_radio", "check_topology", "check_fault", "print_law", "quantity", "choice",
+}  # fmt: skip
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page
 
 
@@ -64,11 +74,10 @@ def test_packages_that_can_be_called_show_the_signature_of_their_function():
 COMMANDS = typer.main.get_command(app).commands
 
 
-def test_every_command_has_a_function_and_every_function_a_command():
-    assert set(COUNTERPARTS) == set(COMMANDS)
-    assert {found.function for found in COUNTERPARTS.values() if "." not in found.function} | set(
-        LIBRARY_FUNCTIONS
-    ) == set(FUNCTIONS)
+def test_every_public_function_is_a_command_or_of_the_library():
+    commands = {verb.function.removeprefix("airflock.") for verb in VERBS.values() if verb.function}
+    assert commands | LIBRARY_FUNCTIONS == set(FUNCTIONS)
+    assert set(COMMANDS) == {name for name in VERBS if " " not in name} | {"fly"}
 
 
 def test_no_cell_of_the_tables_of_commands_and_functions_is_empty():
@@ -81,17 +90,130 @@ def test_no_cell_of_the_tables_of_commands_and_functions_is_empty():
     assert {name for name in COMMANDS if not any(f"airflock {name}" in row[1] for row in rows)} <= {"doctor", "types"}
 
 
-@pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_option_has_its_argument(name):
-    found = COUNTERPARTS[name]
-    assert set(found.options) == {option.name for option in COMMANDS[name].params}
-    arguments = inspect.signature(the(found.function)).parameters
-    for option, argument in found.options.items():
-        if argument.isidentifier():
-            assert argument in arguments, f"{name} {option}: airflock.{found.function} has no {argument}"
-        elif argument.startswith("airflock."):
-            home, _, last = argument.partition("(")[0].rpartition(".")
-            assert callable(getattr(airflock if home == "airflock" else resolve_name(home), last)), argument
+@pytest.mark.parametrize("name", sorted(VERBS))
+def test_options_of_a_verb_are_arguments_of_its_function_shared_options_and_aliases(name):
+    verb = VERBS[name]
+    own = f"{verb.body.__module__}.{verb.body.__qualname__}"
+    origins = {alias.origin for alias in ALIASES if name in alias.verbs.split()} | {verb.function or own}
+    for option in verb.options.values():
+        assert option.origin.partition(": ")[0] in origins | {"airflock.cli.options"}, option
+    declared = read_declaration(verb.function or verb.body).options
+    assert set(declared) <= set(verb.options) | set(verb.without)
+    assert {option.name for option in verb.params} == set(verb.options)
+
+
+@pytest.mark.parametrize("name", sorted({verb.function for verb in VERBS.values() if verb.function}))
+def test_what_is_read_of_a_function_is_its_signature(name):
+    read, signature = read_declaration(name), inspect.signature(the(name.removeprefix("airflock.")))
+    assert list(read.arguments) == [p for p, each in signature.parameters.items() if each.kind is not each.VAR_KEYWORD]
+    for option in read.options.values():
+        default = signature.parameters[option.name].default
+        default = default.stop if isinstance(default, range) else default
+        assert default == (inspect.Parameter.empty if option.default is ... else option.default), option.name
+
+
+def test_no_text_of_an_option_stands_twice():
+    """A text is in a docstring, or in the table of shared options; the modules of verbs have none."""
+    shared = [option.help for members in SHARED.values() for option in members]
+    assert len(set(shared)) == len(shared) and len(SHARED) <= 6 and len(ALIASES) <= 30
+    assert not any("help" in alias.changes for alias in ALIASES)
+    of_functions = {o.help for verb in VERBS.values() for o in verb.options.values() if "cli.options" not in o.origin}
+    assert not of_functions & set(shared)
+    for path in (Path(airflock.__file__).parent / "cli").glob("*_verbs.py"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"typer\.(Option|Argument)|metavar=", text), path
+
+
+def test_a_function_in_one_new_module_is_a_verb_with_help_json_and_example(tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    (tmp_path / "counting_verb.py").write_text(
+        """from airflock.cli.command import verb
+
+@verb("Look something up")
+def count(word: str, *, times: int = 2, loud: bool = False) -> dict:
+    \'\'\'Count letters.
+
+    Example: airflock count flock --times 3
+
+    Parameters
+    ----------
+    word : str (WORD)
+        A word to count.
+    times : int in [1, 9]
+        How often it is counted.
+    loud : bool
+        With `times`: shout.
+    \'\'\'
+    return {"letters": len(word) * times, "loud": loud}
+"""
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.import_module("counting_verb")
+    try:
+        run = CliRunner().invoke
+        assert json.loads(run(app, ["count", "flock", "--times", "3", "--json"]).stdout) == {
+            "letters": 15,
+            "loud": False,
+        }
+        assert "15" in run(app, ["count", "flock", "--times", "3"]).stdout
+        told = " ".join(run(app, ["count", "--help"], env={"COLUMNS": "200"}).stdout.split())
+        for words in (
+            "Example: airflock count flock",
+            "A word to count.",
+            "[default: 2]",
+            "1<=x<=9",
+            "With --times: shout",
+        ):
+            assert words in told, told
+        refused = run(app, ["count", "flock", "--times", "10"])
+        assert "--times 10 lies outside [1, 9]" in str(refused.exception)
+        assert "count" in run(app, ["--help"]).stdout
+    finally:
+        del VERBS["count"]
+
+
+COMPLETED = {
+    "airflock evo": "evolve",
+    "airflock fly pre": "prepare",
+    "airflock run x --preci": "--precision",
+    "airflock run vasarhelyi_2018/real_4": "vasarhelyi_2018/real_4ms",
+    "airflock sweep x --over radio.del": "radio.delay=",
+    "airflock certify x --tolerance-of radio.del": "radio.delay",
+    "airflock run x --law vicsek": "vicsek_1995",
+    "airflock plot x --kind traj": "trajectories",
+    "airflock fleet x --mode task": "tasks",
+    "airflock run x --set world.arena=sq": "world.arena=square",
+}
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_completes_verbs_options_presets_keys_and_choices(shell, monkeypatch, capsys):
+    with pytest.raises(SystemExit):
+        app(["--show-completion", shell])
+    assert f"_AIRFLOCK_COMPLETE=complete_{shell}" in capsys.readouterr().out  # what the script calls
+    for line, word in COMPLETED.items():
+        monkeypatch.setenv("_AIRFLOCK_COMPLETE", f"complete_{shell}")
+        monkeypatch.setenv("_TYPER_COMPLETE_ARGS", line)
+        monkeypatch.setenv("_TYPER_COMPLETE_FISH_ACTION", "get-args")
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(len(line.split()) - 1))
+        with pytest.raises(SystemExit):
+            app([])
+        found = re.split(r'[\n\t"]+|:', capsys.readouterr().out)
+        assert word in [each.strip("() ") for each in found], (line, found)
+
+
+def test_help_and_options_of_every_verb_are_read_without_numpy():
+    code = """
+import sys
+from airflock.cli.command import VERBS
+from airflock.cli.main import app
+assert all(verb.params or name == "doctor" for name, verb in VERBS.items())
+print(sorted({"numpy", "numba", "pandas", "xarray", "scipy"} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.stdout == "[]\n", done.stdout + done.stderr
 
 
 def test_scores_carry_units_and_meanings_and_a_scenario_shows_itself():

@@ -14,6 +14,7 @@ from airflock.parts.aero.wing import pitch
 from airflock.recordings.dataset import make_dataset
 from airflock.recordings.simulation import to_plain_values
 from airflock.support.errors import RecordingError
+from airflock.support.rendering import format_cell
 from airflock.view.flight_paths import paths_in_window, projection
 from airflock.view.order_parameter_plots import flocked
 from airflock.view.rules_plot import downwash, solve_formation, wash
@@ -114,7 +115,7 @@ def test_statistics_of_lists_and_of_what_never_happened():
         "time_to_goal": [3.0, None],
         "t": None,
     }
-    assert terminal.format_number([1.25, float("nan")]) == "1.25, never"
+    assert format_cell([1.25, float("nan")]) == "1.25, never"
 
 
 def test_only_the_time_of_an_event_is_never(capsys):

@@ -347,13 +347,14 @@ def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):
 
 
 def test_what_was_said_before_the_search_is_not_said_again(capsys):
-    from airflock.cli.search_verbs import _print_campaign
+    from airflock.cli.search_verbs import _print_tuned
+    from airflock.search.tuning_run import TuneResult
 
     evolved = SimpleNamespace(fitness=0.5, low=0.4, high=0.6, seeds=10, limits=[])
     told = SimpleNamespace(statements=["r_min<3: shown"])
-    made = SimpleNamespace(
+    made = type("Tuned", (SimpleNamespace,), {"__rich__": TuneResult.__rich__})(
         notes=("scaled", "out of reach"), result=evolved, steps=(), why="no", certificate=told, folder="tuned"
     )
-    _print_campaign(made, ["out of reach"])
+    _print_tuned(made, ["out of reach"])
     printed = capsys.readouterr().out
     assert "start: scaled" in printed and "out of reach" not in printed

@@ -188,12 +188,22 @@ def check_flight_options(precision: int, device: str) -> None:
     errors.raise_errors()
 
 
-def tolerance_keys(scenario: Scenario, tolerance: bool | Sequence[str]) -> tuple[str, ...]:
-    """Return the keys whose tolerance is requested. Raises ScenarioError for one that cannot be varied."""
-    if not tolerance:
+def tolerance_keys(scenario: Scenario, tolerance_of: bool | Sequence[str]) -> tuple[str, ...]:
+    """Return the keys whose tolerance is requested. Raises ScenarioError for one that cannot be varied.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is flown.
+    tolerance_of : bool or sequence of str (KEY)
+        Only for this key, such as radio.delay; repeatable.
+    """
+    if not tolerance_of:
         return ()
 
-    return used_and_unused_keys(scenario) if tolerance is True else check_environment_keys(scenario, list(tolerance))
+    return (
+        used_and_unused_keys(scenario) if tolerance_of is True else check_environment_keys(scenario, list(tolerance_of))
+    )
 
 
 def check_certify_budget(budget: float) -> None:

@@ -19,7 +19,15 @@ from airflock.certificates.counting import LimitVerdict, looks_due
 from airflock.certificates.limits import EventLimit, parse_limits, rate_per_hour, take_look
 from airflock.runs import program_versions, to_toml_values, write_toml_file
 from airflock.scenarios import Scenario, build_scenario
-from airflock.support import StudyError, as_error, expand_path, read_toml
+from airflock.support import (
+    StudyError,
+    as_error,
+    expand_path,
+    format_cell,
+    read_toml,
+    result_group,
+    result_table,
+)
 
 MIN_EVENTS = 10  # events below which nothing is said
 SUSPICIOUS = 0.01  # a chance of less than this is no chance
@@ -237,6 +245,81 @@ class Certificate:
         notes = "".join(f"<li>{escape(text)}</li>" for text in (*self.statements, *self.disclaimers))
         return f"<p><b>{escape(self.campaign.scenario.name)}</b></p>{table}<ul>{notes}</ul>"
 
+    def __rich__(self) -> Any:
+        """Return what the certificate shows and what it does not show, for a terminal."""
+        hazards = [(self.campaign.limits[i].event, hazard) for i, hazard in self.hazards.items() if hazard.events]
+        return result_group(
+            self._limit_table(),
+            *self.statements,
+            *(
+                f"{event}: {hazard.early} of {hazard.events} first events in the first half of flights, "
+                f"{100.0 * hazard.expected:.0f} % if even: {hazard.verdict}"
+                for event, hazard in hazards
+            ),
+            *self._worst_lines(),
+            self._tolerance_table(),
+            self._map_table(),
+            *self.splitting.get("statements", ()),
+            f"Not said: {'; '.join(self.disclaimers)}.",
+        )
+
+    def _limit_table(self) -> Any:
+        campaign = self.campaign
+        rows = [
+            (
+                verdict.limit.text,
+                f"{verdict.events:,}",
+                f"{verdict.flights:,}",
+                upper_bound_in_unit(campaign, verdict),
+                "shown" if verdict.shown else "refuted" if verdict.is_refuted else "not shown",
+            )
+            for verdict in self.verdicts
+        ]
+        title = f"{campaign.scenario.name}: {len(self.rows):,} flights of {campaign.scenario.flight.duration:g} s"
+        at_most = f"at most ({100.0 * campaign.confidence:g} %)"
+        return result_table(title, f"limit; >events; >flights; {at_most}; verdict", rows)
+
+    def _worst_lines(self) -> list[str]:
+        """Return one line for the worst flight of each limit."""
+        lines: dict[str, str] = {}
+        for entry in self.worst:
+            moment = f" before {entry['first']:.0f} s" if "first" in entry else ""
+            worst = f"worst for {entry['limit']}: {format_cell(entry['value'])}{moment}; {entry['replay']}"
+            lines.setdefault(entry["limit"], worst)
+        return list(lines.values())
+
+    def _tolerance_table(self) -> Any:
+        tolerance = self.tolerance
+        if not tolerance or "reason" in tolerance:
+            return f"tolerance: {tolerance['reason']}" if tolerance else None
+        level, confidence = (100.0 * tolerance[name] for name in ("level", "confidence"))
+        rows = [
+            (
+                axis["key"],
+                format_cell(axis["nominal"]),
+                format_cell(axis["safe"]),
+                f"{axis['factor']:.3g}" if "factor" in axis else "",
+                format_cell(axis["not_shown"]) if "not_shown" in axis else "",
+                f"{axis['flights']:,}",
+                axis.get("note", ""),
+            )
+            for axis in tolerance["axis"]
+        ]
+        title = f"safe: fewer than {level:g} % of flights with an event ({confidence:g} %)"
+        heads = "|number; >nominal; >safe to; >factor; >not shown at; >flights; "
+        return result_table(title, heads, rows, overflow="fold")
+
+    def _map_table(self) -> Any:
+        """Return upper bounds in percent of flights, first key downwards, second across."""
+        bounds = self.over
+        if not bounds:
+            return None
+        (down, across), (rows, columns) = bounds["keys"], bounds["axes"]
+        title = f"at most so many % of flights with an event; * safe, below {100.0 * bounds['level']:g} %"
+        cells = [f"{100.0 * cell['high']:.3g}{'*' if cell['verdict'] == 'safe' else ''}" for cell in bounds["cell"]]
+        lines = [(f"{value:g}", *cells[i * len(columns) : (i + 1) * len(columns)]) for i, value in enumerate(rows)]
+        return result_table(title, "; ".join((f"*{down} / {across}", *(f">{value:g}" for value in columns))), lines)
+
 
 def campaign_disclaimers(campaign: Campaign) -> list[str]:
     """Return sentences on what a certificate does not show, with the numbers whose intervals were flown."""
@@ -380,7 +463,7 @@ def check_certificate(
     trust: bool = False,
     on_done: Callable[[], None] | None = None,
 ) -> CheckReport:
-    """Check a certificate file.
+    """Check a certificate file: fly one flight in a hundred again and compare the bits.
 
     path    : of certificate.toml; threads : of the flights, all processors by default
     trust   : True lets a law run that stands in a Python file named by the scenario

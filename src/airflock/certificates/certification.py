@@ -292,15 +292,16 @@ def certify(
 
     Parameters
     ----------
-    scenario : Scenario, str or path, optional
-        What is flown; none to continue what a folder holds.
+    scenario : Scenario, str or path (PRESET|FILE), optional
+        What is flown; none to continue what a folder holds; with --check a certificate.
     limit : str or list of str
         "r_min<1 at 1e-3/h", "n_coll>=1 at 1e-2/drone-h", "clearance<0 at 1%", "phi_vel>=3 in 99%"; without a rate the
         event is bounded as well as the flights allow. All limits hold together.
     confidence : float
-        Of all that is shown, in (0, 1).
+        Confidence that all limits hold together, in (0, 1).
     budget : float, optional
-        Time that may be spent, s; by default 600. A campaign that is over takes more only if it is given.
+        Time that may be spent, s, for a command also 10min or 2h; a campaign that is over takes more only if it is
+        given; by default 600.
     flights : int, optional
         Fly so many, whatever the time, and look once.
     folder : str or path, optional
@@ -317,8 +318,9 @@ def certify(
         Also find how far each number of the environment may move; or only the keys that are named.
     split : bool
         Also estimate limits on r_min by splitting, which finds and ranks rare flights but shows nothing.
-    over : mapping, optional
-        Two keys with their values, {"radio.delay": [0.5, 1.0], "body.noise": [0.2, 0.4]}: also bounds over this grid.
+    over : mapping (KEY=VALUES), optional
+        Two keys with their values: also bounds over this grid, {"radio.delay": [0.5, 1.0], "body.noise": [0.2, 0.4]};
+        for a command twice, such as radio.delay=0.5:1.5:5.
     precision : int
         Bits per number: 32 or 64.
     device : str

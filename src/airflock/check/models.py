@@ -438,9 +438,9 @@ def check_types(files: Any = (), *, out: Any = None) -> NoReturn:
 
     Parameters
     ----------
-    files : str, Path or sequence of them
+    files : str, Path or sequence of them (FILE.py...)
         Not read.
-    out : str or Path, optional
+    out : str or Path (FOLDER), optional
         Not written.
 
     Returns

@@ -1,16 +1,20 @@
-"""Commands that report every error of a command line at once, and their messages."""
+"""Verbs from functions, which report every error of a command line at once, and their messages."""
 
 import inspect
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+import typer.main
+from typer.core import TyperCommand, TyperGroup
 
-from airflock.support import INVALID, AirflockError, suggest
+from airflock.cli.options import ALIASES, Option, completion_of, read_declaration, shared_options
+from airflock.support import INVALID, AirflockError, ErrorCollector, suggest
 
 OUTPUT_OPTIONS = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
 SIMILARITY_CUTOFF = 0.75  # of options, as in `spelling.suggest`: both begin with --, and --budget is not --quiet
@@ -167,32 +171,126 @@ def _choices(parameter: Any) -> list[str]:
 
 ERRORS_KEY = "airflock.errors"  # of a command line, in the context of its verb
 VALUE_ERROR_NAMES = ("BadParameter", "MissingParameter")  # errors of one option alone
-NUMBER_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")  # kinds of options
+CARRIED_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange", "TyperChoice")  # kinds of options
+FORMATS = "the formats that airflock import --help lists"  # in a docstring; a help is printed with their names
+VERBS: dict[str, "VerbCommand"] = {}  # by full name, such as `fly prepare`
 
 
-FORMATS = "the formats that airflock import --help lists"  # in a help text, which is printed with their names
+def verb(
+    panel: str, function: str = "", shared: str = "", *, name: str = "", without: str = ""
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make a verb of a function: its options are the arguments of a public function, or its own.
+
+    panel     : heading in the list of commands
+    function  : public name such as `airflock.sweep`; empty: the decorated function itself, which takes the values
+    shared    : options and groups of `options.SHARED` that the verb has, too
+    name      : of the verb, if the decorated function has another
+    without   : arguments that only Python takes, or another verb
+
+    A decorated function with `function` takes one namespace of all values, and a collector of errors if it goes on
+    with invalid numbers to report all errors at once. What it returns is printed, or shown as JSON.
+    """
+
+    def register(body: Callable[..., Any]) -> Callable[..., Any]:
+        full = name or body.__name__
+        VERBS[full] = VerbCommand(full, panel, body, function, shared.split(), without.split())
+        return body
+
+    return register
 
 
 class VerbCommand(TyperCommand):
     """Command that checks its options one by one; nan and inf are refused where an option has a range.
 
-    A verb that takes its context goes on with numbers that are `WRONG`, and refuses them with all else that it finds
-    wrong (`options.collect_option_errors`); any other ends before it begins.
+    A verb that takes a collector of errors goes on with numbers that are `INVALID`, and reports them with all else
+    that it finds wrong; any other ends before it begins. Options are read when the verb is called or listed.
     """
+
+    def __init__(
+        self, full: str, panel: str, body: Callable[..., Any], function: str, shared: Sequence[str],
+        without: Sequence[str],
+    ):  # fmt: skip
+        self.full, self.body, self.function = full, body, function
+        self._shared, self.without = shared, without
+        about = inspect.getdoc(body) or read_declaration(function).help
+        about = about.partition("\nParameters\n---")[0].strip()
+        super().__init__(full.rpartition(" ")[2], help=about, rich_help_panel=panel or None, rich_markup_mode="rich")
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help, with the formats of files that can be read now."""
         for parameter in self.params:
-            if FORMATS in (getattr(parameter, "help", None) or ""):
+            text = self.options[parameter.name].help
+            if FORMATS in text:  # each time anew: a format may have joined since the last help
                 from airflock.recordings import format_words
 
-                parameter.help = parameter.help.replace(FORMATS, format_words())  # type: ignore[attr-defined]
+                parameter.help = text.replace(FORMATS, format_words())
         super().format_help(ctx, formatter)
+
+    @cached_property
+    def options(self) -> Mapping[str, Option]:
+        """Options by name: arguments of the function, shared options, then what the table of aliases changes."""
+        declared = read_declaration(self.function or self.body)
+        options = {name: each for name, each in declared.options.items() if name not in self.without}
+        for name, each in shared_options(self._shared).items():
+            own = declared.options.get(name, each).default
+            options[name] = each if own in (None, ...) or each.is_argument else each._replace(default=own)
+        if declared.has_result and not self.function:
+            options |= shared_options(["json"])
+        for alias in ALIASES:
+            if self.full in alias.verbs.split():
+                options |= {each.name: each for each in alias.options(options)}
+        return options
+
+    @cached_property
+    def _built(self) -> Any:
+        """Return the command that typer makes of the options."""
+        ctx = inspect.Parameter("ctx", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
+        options = sorted(self.options.values(), key=lambda each: not each.is_argument)
+
+        def call(ctx: typer.Context, **values: Any) -> None:
+            self._call(ctx, values)
+
+        call.__signature__ = inspect.Signature([ctx, *map(_typer_parameter, options)])  # type: ignore[attr-defined]
+        one = typer.Typer(add_completion=False)
+        one.command()(call)
+        return typer.main.get_command(one)
+
+    def _call(self, ctx: typer.Context, values: dict[str, Any]) -> None:
+        """Call the verb with the values of its options, and print the result."""
+        from airflock.cli.terminal import print_result
+
+        as_json = bool(values.get("json"))
+        wanted = inspect.signature(self.body).parameters
+        errors = {"errors": ErrorCollector(ctx.meta.get(ERRORS_KEY, ()))} if "errors" in wanted else {}
+        if self.function:
+            result = self.body(SimpleNamespace(**values), **errors)
+        else:
+            result = self.body(**{key: value for key, value in values.items() if key in wanted}, **errors)
+        if result is not None:
+            print_result(result, as_json)
+
+    @property
+    def params(self) -> list[Any]:
+        """Options and arguments, as typer has them."""
+        return self._built.params  # type: ignore[no-any-return]
+
+    @params.setter
+    def params(self, _: Any) -> None:
+        pass
+
+    @property
+    def callback(self) -> Callable[..., Any]:
+        """Function that typer calls with what it has read."""
+        return self._built.callback  # type: ignore[no-any-return]
+
+    @callback.setter
+    def callback(self, _: Any) -> None:
+        pass
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of a command line."""
         errors: list[str] = []
-        carried = True  # whether everything that is wrong is a number
+        carried = True  # True while everything that is wrong is a number or a choice
         try:
             rest = super().parse_args(ctx, list(args))
         except Exception as error:
@@ -205,12 +303,12 @@ class VerbCommand(TyperCommand):
             ctx.params[name] = INVALID
             errors.append(line)
         ctx.meta[ERRORS_KEY] = errors
-        if errors and not (carried and _takes_context(self.callback)):
+        if errors and not (carried and "errors" in inspect.signature(self.body).parameters):
             raise AirflockError("\n".join(errors))
         return rest
 
     def _one_by_one(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str], bool]:
-        """Return the unread words, the errors of all options, and for each whether it is a number's."""
+        """Return the unread words, the errors of all options, and True if all are of numbers or choices."""
         given, rest, _ = self.make_parser(ctx).parse_args(args=list(args))
         errors, carried = [], True
         for parameter in self.get_params(ctx):
@@ -221,7 +319,7 @@ class VerbCommand(TyperCommand):
                     raise
                 errors.append(usage_error(error, args))
                 number = (
-                    type(error).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
+                    type(error).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in CARRIED_TYPE_NAMES
                 )
                 carried = carried and number and not parameter.multiple
                 ctx.params[parameter.name] = INVALID
@@ -234,7 +332,41 @@ class VerbCommand(TyperCommand):
         return rest, errors, carried
 
 
-def _takes_context(callback: Callable[..., Any] | None) -> bool:
-    """Return True if a verb takes its context, with which it reports errors of its numbers."""
-    wanted = () if callback is None else inspect.signature(callback).parameters.values()
-    return any(each.annotation is typer.Context for each in wanted)
+def _typer_parameter(option: Option) -> inspect.Parameter:
+    """Return an option as typer reads it in the signature of a function."""
+    kind, default = option.kind, option.default
+    if default is None or (isinstance(default, tuple) and not default):
+        kind, default = kind | None, None
+    how: dict[str, Any] = {"help": option.help, "metavar": option.metavar, "autocompletion": completion_of(option)}
+    how["show_default"] = option.shown or default not in (None, "", ...)
+    if option.kind in (int, float):
+        how |= {"min": option.low, "max": option.high}
+        how |= {end: int(how[end]) for end in ("min", "max") if option.kind is int and how[end] is not None}
+    if option.is_argument:
+        info = typer.Argument(**how)
+    else:
+        flag = f"--{option.name.strip('_').replace('_', '-')}"
+        spelled = option.spelled or ((flag, f"--no-{flag[2:]}") if option.is_negatable else (flag,))
+        pair = option.kind is bool and len(spelled) > 1
+        info = typer.Option("/".join(spelled), **how) if pair else typer.Option(*spelled, **how)
+    empty = inspect.Parameter.empty if default is ... else default
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    return inspect.Parameter(option.name, keyword, default=empty, annotation=Annotated[kind, info])
+
+
+PANELS = (
+    "Fly, measure, look", "Search and make safe", "Recordings of others", "Towards real drones", "Look something up",
+)  # fmt: skip
+
+
+class GroupOfVerbs(TyperGroup):
+    """Group of the verbs whose full names begin with `prefix`, by their headings."""
+
+    prefix = ""
+
+    def __init__(self, **how: Any):
+        super().__init__(**how)
+        own = [each for full, each in VERBS.items() if full.rpartition(" ")[0] == self.prefix]
+        known = {each: place for place, each in enumerate(PANELS)}
+        own.sort(key=lambda each: known.get(each.rich_help_panel or "", len(PANELS)))
+        self.commands = {**{str(each.name): each for each in own}, **self.commands}

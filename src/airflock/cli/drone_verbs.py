@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import typer
-from typer.core import TyperGroup
 
 from airflock.cli import options, terminal
-from airflock.cli.command import VerbCommand
+from airflock.cli.command import GroupOfVerbs, verb
 from airflock.cli.terminal import counting_parts
 from airflock.support import (
     INVALID,
@@ -25,72 +25,14 @@ from airflock.support import (
     value_or_default,
 )
 
+PANEL = "Towards real drones"
+
+
 ALL_SYSTEM_IDS = tuple(range(1, 251))  # ids that drones may have
 
 
-def fleet(
-    ctx: typer.Context,
-    scenario: options.Where,
-    seeds: options.Seeds = 1,
-    first_seed: options.FirstSeed = 0,
-    changes: options.Set = None,
-    trust: options.Trust = False,
-    agents: options.Agents = None,
-    duration: options.Duration = None,
-    vehicle: Annotated[str, typer.Option(help="Autopilot that the vehicles imitate: px4 or ardupilot.")] = "px4",
-    body: Annotated[
-        str | None,
-        typer.Option(
-            metavar="multirotor|quadrotor|autopilot",
-            help="How the vehicles move.",
-            show_default="the scenario's; with --vehicle ardupilot and a preset autopilot",
-        ),
-    ] = None,
-    mode: Annotated[
-        str,
-        typer.Option(
-            help="lockstep: on a virtual clock, the same bits each time. tasks, processes: on the real clock over UDP "
-            "on this computer, in one process or with a process for each node and each vehicle."
-        ),
-    ] = "lockstep",
-    join: Annotated[
-        int,
-        typer.Option(
-            min=1024,
-            max=65000,
-            help="On the real clock: port where the first vehicle contacts MAVSDK, MAVProxy or QGroundControl; "
-            "the others use the next ones.",
-        ),
-    ] = 14540,
-    faults: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help=r"Faults to inject: tables \[\[fault]].")
-    ] = None,
-    against: Annotated[
-        str | None, typer.Option(metavar="simulator", help="Fly the simulator beside it, and compare.")
-    ] = None,
-    silence: Annotated[
-        bool | None,
-        typer.Option(
-            "--silence/--no-silence",
-            show_default=False,
-            help="Stop while a neighbour that is lost could be near; by default yes, but beside the simulator as its "
-            "silence.rule says.",
-        ),
-    ] = None,
-    ground: Annotated[
-        bool, typer.Option("--ground", help="Take off, gather, flock, return and land, instead of starting in the air.")
-    ] = False,
-    card_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--card",
-            metavar="FILE.json",
-            help="On the real clock: write the flight card and its key here; airflock watch FILE.json shows the fleet.",
-        ),
-    ] = None,
-    save: options.SaveFile = None,
-    as_json: options.Json = False,
-) -> None:
+@verb(PANEL, "airflock.fleet", "scenario settings trust agents duration SEEDS save json")
+def fleet(o: SimpleNamespace, errors: ErrorCollector) -> None:
     """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step or on the real clock.
 
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 10 --duration 60 --seeds 5 --against simulator
@@ -102,37 +44,38 @@ def fleet(
     """
     from airflock.fleets import SECONDS_BEFORE_START, compare, flying
 
-    errors, live = options.collect_option_errors(ctx), mode != flying.LOCKSTEP_MODE
-    errors.read(options.check_writable, (save, RECORDINGS), (card_file, (".json",)))
-    settings = options.collect_settings(errors, changes, agents, duration)
-    settings = errors.read(lambda given: flying.vehicle_body(scenario, given, vehicle, body), settings)
-    loaded = options.collect_scenario(errors, scenario, settings, trust=trust)
+    live, beside = o.mode not in (flying.LOCKSTEP_MODE, INVALID), o.beside is not None
+    errors.read(options.check_writable, (o.save, RECORDINGS), (o.card, (".json",)))
+    settings = options.collect_settings(errors, o)
+    settings = errors.read(
+        flying.vehicle_body, o.scenario, settings, value_or_default(o.vehicle, ""), value_or_default(o.body, None)
+    )
+    loaded = options.collect_scenario(errors, o.scenario, settings, trust=o.trust)
     loaded = errors.read(
         lambda found: compare.with_metric_period(found, found.sensors.period or found.flight.dt), loaded
     )
-    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    numbers = errors.read(options.seeds_from, o.first_seed, o.seeds)
     members = errors.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
-    broken = errors.read(_broken, faults, value_or_default(members, ALL_SYSTEM_IDS), live)
-    errors.note(*_option_errors(vehicle, body, mode, card_file, against))
-    errors.read(_check_one_card, card_file, loaded, numbers)
+    broken = errors.read(_broken, o.faults, value_or_default(members, ALL_SYSTEM_IDS), live)
+    if o.card is not None and o.mode == flying.LOCKSTEP_MODE:
+        errors.note(f"--card {o.card}: in lock-step it flies too fast to watch; add --mode tasks or processes")
+    if o.beside not in (None, "simulator"):
+        errors.note(f"--against {o.beside}: only simulator is known")
+    errors.read(_check_one_card, o.card, loaded, numbers)
     errors.raise_errors()
     terminal.print_notes(loaded.notes)
-    how: dict[str, Any] = {
-        "vehicle": vehicle,
-        "mode": mode,
-        "from_ground": ground,
-        "join": join,
-        "card_file": card_file,
-    }
-    how["stop_for_lost"] = True if silence is None and not against else silence
-    series = flying.FleetRuns(loaded, vehicle)
-    ticks = seeds * int(loaded.flight.duration + (SECONDS_BEFORE_START if ground else 0.0))
-    with counting_parts(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _frozen_imports():
+    how: dict[str, Any] = {name: getattr(o, name) for name in ("vehicle", "mode", "join")}
+    how |= {"from_ground": o.ground, "card_file": o.card}
+    how["stop_for_lost"] = True if o.silence is None and not beside else o.silence
+    series = flying.FleetRuns(loaded, o.vehicle)
+    ticks = o.seeds * int(loaded.flight.duration + (SECONDS_BEFORE_START if o.ground else 0.0))
+    with counting_parts(f"{loaded.name}: fleet", ticks, quiet=o.json) as done, _frozen_imports():
         how |= {"on_done": done, "notify": terminal.print_message}
         for flown in flying.fly_seeds(loaded, numbers, faults=broken, **how):
-            series.add(flown, with_simulator=against is not None, starts_alike=not ground and not live)
-            _save(save, flown.seed, seeds, flown)
-    _print_runs(series, as_json)
+            series.add(flown, with_simulator=beside, starts_alike=not o.ground and not live)
+            if o.save is not None:
+                _save(options.file_of_seed(o.save, flown.seed, numbers), flown)
+    _print_runs(series, o.json)
 
 
 def _broken(file: Path | None, members: tuple[int, ...], live: bool) -> Sequence[Any]:
@@ -150,26 +93,6 @@ def _check_one_card(file: Path | None, scenario: Any, seeds: Sequence[int]) -> N
         options.raise_errors([f"--card {file}: with tolerances each seed has its own card; add --seeds 1"])
 
 
-def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:
-    """Return errors of options that do not concern the scenario."""
-    from airflock.fleets import FLEET_MODES, VEHICLE_BODIES, VEHICLE_KINDS
-
-    errors = [
-        f"{option} {word} is none of {', '.join(known)}{suggest(word, known, lead='; ')}"
-        for option, word, known in (
-            ("--vehicle", vehicle, VEHICLE_KINDS),
-            ("--body", body, VEHICLE_BODIES),
-            ("--mode", mode, FLEET_MODES),
-        )
-        if word is not None and word not in known
-    ]
-    if card_file is not None and mode == FLEET_MODES[0]:
-        errors.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
-    if against not in (None, "simulator"):
-        errors.append(f"--against {against}: only simulator is known")
-    return errors
-
-
 @contextmanager
 def _frozen_imports() -> Iterator[None]:
     """Keep the garbage collector off existing objects: one full collection takes a tenth of a second."""
@@ -180,13 +103,10 @@ def _frozen_imports() -> Iterator[None]:
         gc.unfreeze()
 
 
-def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
-    if save is None:
-        return
+def _save(path: Path, flown: Any) -> None:
     from airflock.fleets import fleet_recording
     from airflock.recordings import save as save_recording
 
-    path = save if seeds == 1 else save.with_name(f"{save.stem}-seed{seed}{save.suffix}")
     terminal.print_message(f"saved {save_recording(fleet_recording(flown), path)}")
 
 
@@ -248,56 +168,72 @@ OVERHEAD_BYTES = 64  # bytes of headers of the link; our choice, WiFi with UDP a
 PREAMBLE_SECONDS = 2e-4  # s of a packet before its first bit; WiFi's long preamble
 DEFAULT_SITE = (0.0, 0.0, 0.0)
 MAX_AIRTIME_SHARE = 0.6  # of the channel's time that a flock may take; our choice: random access breaks down beyond
-FAST_BITS, SLOW_BITS = 6e6, 250e3  # bit/s: WiFi's multicast rate as it should be set; IEEE 802.15.4
+FAST_BITS = 6e6  # bit/s: WiFi's multicast rate as it should be set
+SLOW_BITS = 250e3  # bit/s: IEEE 802.15.4
 
 
+@verb("", shared="scenario settings trust json", name="fly prepare")
 def prepare(
-    ctx: typer.Context,
-    scenario: options.Where,
-    site: Annotated[
-        str, typer.Option(metavar="LAT,LON,ALT", help="Centre of the arena on the ground; ALT above sea level, m.")
-    ],
-    members: Annotated[str, typer.Option(metavar="1-10", help="System ids of the drones, such as 1-10 or 1,2,5.")],
-    changes: options.Set = None,
-    trust: options.Trust = False,
-    autopilot: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
-    height: Annotated[
-        float | None, typer.Option(help="Height of the flock, m above the site.", show_default="20")
-    ] = None,
-    margin: Annotated[float, typer.Option(min=0.0, help="Distance of the fence outside the law's walls, m.")] = 30.0,
-    move_field: Annotated[
-        bool,
-        typer.Option("--move-field", help="Fly the outline of a map at --site, though the map lies elsewhere."),
-    ] = False,
-    hours: Annotated[float, typer.Option(min=0.1, max=168.0, help="How long card and key stay valid, h.")] = 12.0,
-    limits: Annotated[
-        list[str] | None, typer.Option("--limit", metavar="KEY=VALUE", help="Change a limit, for instance brake=2.")
-    ] = None,
-    fast_bits: Annotated[float, typer.Option(min=100.0, help="Bits per second of the fast radio.")] = FAST_BITS,
-    slow_bits: Annotated[float, typer.Option(min=100.0, help="Bits per second of the slow radio.")] = SLOW_BITS,
-    out: Annotated[Path, typer.Option(metavar="FILE.json", help="The card; keys are written beside it.")] = Path(
-        "mission.json"
-    ),
-    as_json: options.Json = False,
+    scenario: str,
+    *,
+    errors: ErrorCollector,
+    site: str,
+    members: str,
+    settings: list[str] | None = None,
+    trust: bool = False,
+    autopilot: str = "px4",
+    height: float | None = None,
+    margin: float = 30.0,
+    move_field: bool = False,
+    hours: float = 12.0,
+    limit: list[str] | None = None,
+    fast_bits: float = FAST_BITS,
+    slow_bits: float = SLOW_BITS,
+    out: Path = Path("mission.json"),
+    json: bool = False,
 ) -> None:
     """Write the flight card, the mission's key and the operator's key.
 
     Card and mission.key go to every drone; mission.operator stays with the operator.
 
     Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10 --out mission.json
+
+    Parameters
+    ----------
+    site : str (LAT,LON,ALT)
+        Centre of the arena on the ground; ALT above sea level, m.
+    members : str (1-10)
+        System ids of the drones, such as 1-10 or 1,2,5.
+    autopilot : str
+        Autopilot of the drones: px4 or ardupilot.
+    height : float, optional
+        Height of the flock, m above the site; by default 20.
+    margin : float in [0, inf]
+        Distance of the fence outside the law's walls, m.
+    move_field : bool
+        Fly the outline of a map at --site, though the map lies elsewhere.
+    hours : float in [0.1, 168]
+        How long card and key stay valid, h.
+    limit : sequence of str (KEY=VALUE)
+        Change a limit, for instance brake=2.
+    fast_bits : float in [100, inf]
+        Bits per second of the fast radio.
+    slow_bits : float in [100, inf]
+        Bits per second of the slow radio.
+    out : path (FILE.json)
+        The card; keys are written beside it.
     """
     import secrets
 
     from airflock.drones import card_hash, new_operator_keys, parse_card
     from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes, site_notes
 
-    errors = options.collect_option_errors(ctx)
     where, systems = errors.read(options.parse_position, "--site", site), errors.read(_members, members)
     errors.read(options.check_writable, (out, (".json",)))
     files = MissionFiles(out, out.with_suffix(".key"), out.with_suffix(".operator"))
     errors.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
-    loaded = options.collect_scenario(errors, scenario, errors.read(options.parse_settings, changes), trust=trust)
-    safety = _limits(limits, loaded, errors)
+    loaded = options.collect_scenario(errors, scenario, errors.read(options.parse_settings, settings), trust=trust)
+    safety = _limits(limit, loaded, errors)
     private, public = new_operator_keys()
 
     def card_for(scenario: Any) -> dict[str, Any]:
@@ -323,7 +259,7 @@ def prepare(
     card = _write_mission(files, document, private)
     beside = deviation_notes(loaded, card.safety, len(card.members))
     terminal.print_notes([*loaded.notes, *omission_notes(loaded), *beside, *moved])
-    if as_json:
+    if json:
         radio = {each.radio: each.share for each in loads}
         terminal.print_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})
     else:
@@ -436,22 +372,37 @@ def _members(text: str) -> list[int]:
 KILL_NOTE = "; the motors stop when kill --confirm follows within 5 s"
 
 
+@verb("", name="fly order")
 def order(
-    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
-    do: Annotated[
-        str, typer.Argument(metavar="ORDER", help="start, go, goto, hold, resume, return, land, kill or ping.")
-    ],
-    radio: Annotated[str, typer.Option(metavar="PORT", help="udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")],
-    target: Annotated[int, typer.Option(min=0, max=250, help="System id; 0 for all.")] = 0,
-    delay: Annotated[float, typer.Option("--in", min=0.0, max=60.0, help="Delay of a start, s.")] = 3.0,
-    point: Annotated[
-        str | None, typer.Option(metavar="LAT,LON,ALT", help="Where to go, for goto; ALT above sea level, m.")
-    ] = None,
-    confirm: Annotated[bool, typer.Option("--confirm", help="Second step of a kill, within 5 s of the first.")] = False,
+    card_file: Path,
+    do: str,
+    *,
+    radio: str,
+    target: int = 0,
+    in_: float = 3.0,
+    point: str | None = None,
+    confirm: bool = False,
 ) -> None:
     """Send an order, signed with the operator's key beside the card. It is sent five times; each drone obeys it once.
 
     Example: airflock fly order mission.json start --radio 'udp:0.0.0.0:14601>192.168.1.255:14600'
+
+    Parameters
+    ----------
+    card_file : path (CARD)
+        The flight card.
+    do : str (ORDER)
+        start, go, goto, hold, resume, return, land, kill or ping.
+    radio : str (PORT)
+        udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD.
+    target : int in [0, 250]
+        System id; 0 for all.
+    in_ : float in [0, 60]
+        Delay of a start, s.
+    point : str (LAT,LON,ALT), optional
+        Where to go, for goto; ALT above sea level, m.
+    confirm : bool
+        Second step of a kill, within 5 s of the first.
     """
     from airflock.drones import PacketSigner, check_port, orders, read_card, read_key
 
@@ -473,7 +424,7 @@ def order(
     assert what is not None
     utc = time.time_ns() // 1000
     place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
-    command = orders.OperatorOrder(what, target, card.mission, utc, utc + round(delay * 1e6), place)
+    command = orders.OperatorOrder(what, target, card.mission, utc, utc + round(in_ * 1e6), place)
     _send(radio, orders.order_message(command, private), PacketSigner(key, orders.OPERATOR_SYSTEM))
     effect = KILL_NOTE if what is orders.OrderKind.KILL else ""
     terminal.print_message(f"sent {what.name} to {f'drone {target}' if target else 'all'}{effect}")
@@ -513,8 +464,10 @@ def _check_inside_fence(card: Any, option: tuple[float, float, float], point: st
         raise CardError([f"--point {point}: lies {far:.4g} m outside of the fence"])
 
 
-class FlyGroup(TyperGroup):
+class FlyGroup(GroupOfVerbs):
     """Subcommands of fly; any other word is a flight card, which is flown."""
+
+    prefix = "fly"
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return a subcommand by its name; `run_node` for the name of a file."""
@@ -543,20 +496,21 @@ def run_node(ctx: typer.Context) -> None:
     raise typer.Exit(main(ctx.args))
 
 
-fly_app.command("prepare", cls=VerbCommand)(prepare)
-fly_app.command("order", cls=VerbCommand)(order)
 SPAN_GAP = 2.0  # s; ticks that differ are reported together unless so many agree between them
 
 
-@fly_app.command("replay", cls=VerbCommand)
-def replay(
-    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of a node.", show_default=False)],
-    as_json: options.Json = False,
-) -> None:
+@verb("", shared="json", name="fly replay")
+def replay(card_file: Path, log: Path, *, json: bool = False) -> None:
     """Fly the log of a node again: the same inputs must give the same outputs, to the bit.
 
     Example: airflock fly replay mission.json mission-3-20270115T101500Z.log
+
+    Parameters
+    ----------
+    card_file : path (CARD)
+        The flight card.
+    log : path (LOG)
+        Log of a node.
     """
     from airflock.drones import code_version, read_card, read_key, replay_log_file
 
@@ -576,7 +530,7 @@ def replay(
             begin, _, count = spans.pop() if goes_on else (tick.time, tick.time, 0)
             spans.append((begin, tick.time, count + 1))
     other = "" if version == code_version() else f"flown by another version ({version}; this is {code_version()})"
-    if as_json:
+    if json:
         terminal.print_json({"ticks": ticks, "different": different, "another_version": other or None, "notes": notes})
     else:
         for at, note in notes:

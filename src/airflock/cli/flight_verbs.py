@@ -2,14 +2,13 @@
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from enum import StrEnum
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
-
-import typer
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 from airflock.cli import options, terminal
+from airflock.cli.command import verb
 from airflock.cli.terminal import counting_parts
 from airflock.support import (
     INVALID,
@@ -21,56 +20,48 @@ from airflock.support import (
     ErrorCollector,
     ScenarioError,
     StudioError,
-    collect_errors,
+    format_cell,
+    result_table,
+    value_or_default,
 )
+
+PANEL = "Fly, measure, look"
+
 
 ScoreValues = Mapping[str, Any]  # order parameters, or keys with their values, by name
 
 
-def run(
-    ctx: typer.Context,
-    scenario: options.Where,
-    seeds: options.Seeds = 1,
-    first_seed: options.FirstSeed = 0,
-    changes: options.Set = None,
-    law: options.Law = None,
-    trust: options.Trust = False,
-    agents: options.Agents = None,
-    duration: options.Duration = None,
-    threads: options.Threads = None,
-    precision: options.Precision = 32,
-    device: options.Device = "cpu",
-    scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-    save: options.SaveFile = None,
-    plot: options.PlotFile = None,
-) -> None:
+FOR_RECORDINGS = "scenario_or_recording aero groups body_length"
+
+
+@verb(PANEL, "airflock.score", "SCENARIO SEEDS FLYING json save plot", without=FOR_RECORDINGS)
+def run(o: SimpleNamespace, errors: ErrorCollector) -> None:
     """Fly a scenario and print its order parameters, next to those of the paper if it gives any.
+
+    --plot draws the trajectories of the first flight.
 
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
     from airflock.engine import pick_device
     from airflock.runs import score_scenarios
 
-    errors = options.collect_option_errors(ctx)
-    errors.read(options.check_writable, (save, RECORDINGS), (plot, PICTURES))
-    changed = options.collect_settings(errors, changes, agents, duration)
-    found = options.collect_scenario(errors, scenario, changed, law, trust=trust)
-    numbers = errors.read(options.seeds_from, first_seed, seeds)
-    errors.read(options.check_flight_options, device, precision, scheduler)
+    errors.read(options.check_writable, (o.save, RECORDINGS), (o.plot, PICTURES))
+    changed = options.collect_settings(errors, o)
+    scenario = options.collect_scenario(errors, o.scenario, changed, o.law, trust=o.trust)
+    numbers = errors.read(options.seeds_from, o.first_seed, o.seeds)
+    errors.read(options.check_flight_options, o.device, o.precision, o.scheduler)
     errors.raise_errors()
-    terminal.print_notes(found.notes)
-    flights = [found] * seeds
-    if scheduler is None:
-        device = pick_device(flights, device, precision=precision, notify=terminal.print_message)
-        options.announce_run_time(flights, threads, device)
-        options.compile_before_bar(found, precision, device)
-    chosen: dict[str, Any] = {"scheduler": scheduler, "threads": threads, "precision": precision, "device": device}
-    with counting_parts(f"{found.name}: flights", seeds, quiet=as_json) as done:
-        rows = score_scenarios(flights, numbers, **chosen, on_done=done)
-    _print_scores(found, numbers, rows, changed, as_json)
-    if save or plot:  # after the scores, which a full disk does not take away
-        _record(found, numbers, precision, device, save, plot)
+    terminal.print_notes(scenario.notes)
+    flights = [scenario] * o.seeds
+    if o.scheduler is None:
+        o.device = pick_device(flights, o.device, precision=o.precision, notify=terminal.print_message)
+        options.announce_run_time(flights, o.threads, o.device)
+        options.compile_before_bar(scenario, o.precision, o.device)
+    with counting_parts(f"{scenario.name}: flights", o.seeds, quiet=o.json) as done:
+        rows = score_scenarios(flights, numbers, on_done=done, **options.flying(o))
+    _print_scores(scenario, numbers, rows, changed, o.json)
+    if o.save or o.plot:  # after the scores, which a full disk does not take away
+        _record(scenario, numbers, o)
 
 
 def _print_scores(
@@ -102,51 +93,26 @@ def _print_scores(
         terminal.print_message(remark)
 
 
-def _record(
-    scenario: Any, numbers: Sequence[int], precision: int, device: str, save: Path | None, plot: Path | None
-) -> None:
+def _record(scenario: Any, numbers: Sequence[int], o: SimpleNamespace) -> None:
     """Fly again with the trajectories kept (the same bits), and write the requested files."""
     from airflock.recordings import save as save_recording, simulate
 
-    for seed in numbers if save else numbers[:1]:
-        recording = simulate(scenario, seed, precision=precision, device=device)
-        if save:
-            many = len(numbers) > 1
-            path = save.with_name(f"{save.stem}-seed{seed}{save.suffix}") if many else save
-            terminal.print_message(f"saved {save_recording(recording, path)}")
-        if plot and seed == numbers[0]:
-            from airflock.view import save_figure, trajectories
+    for seed in numbers if o.save else numbers[:1]:
+        recording = simulate(scenario, seed, precision=o.precision, device=o.device)
+        if o.save:
+            terminal.print_message(f"saved {save_recording(recording, options.file_of_seed(o.save, seed, numbers))}")
+        if o.plot and seed == numbers[0]:
+            from airflock.view import trajectories
 
-            save_figure(trajectories(recording), plot)
-            terminal.print_message(f"saved {plot}")
+            terminal.save_picture(trajectories(recording), o.plot)
 
 
-def score(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE.nc...", help="Recordings to measure.", show_default=False)
-    ],
-    changes: options.Set = None,
-    trust: options.Trust = False,
-    as_json: options.Json = False,
-    series: Annotated[
-        Path | None, typer.Option(metavar="FILE.csv", help="Also write the order parameters over time.")
-    ] = None,
-    aero: Annotated[
-        bool,
-        typer.Option(
-            "--aero",
-            help="Measure the power saved by flying in each other's upwash; set the wing with --set wing.span=...",
-        ),
-    ] = False,
-    groups: Annotated[
-        bool, typer.Option("--groups", help="Measure each group of the scenario, and each pair of groups.")
-    ] = False,
-    body_length: Annotated[
-        float | None,
-        typer.Option(metavar="METRES", help="For tracks: length of a body, which sets what counts as near."),
-    ] = None,
-) -> None:
-    """Measure recordings, simulated or flown, with the same order parameters.
+FOR_SCENARIOS = "scenario_or_recording seeds threads precision device scheduler"
+
+
+@verb(PANEL, "airflock.score", "settings trust json", without=FOR_SCENARIOS)
+def score(o: SimpleNamespace) -> None:
+    """Measure recordings, simulated or flown, with the same order parameters; --series writes them over time.
 
     Tracks have no scenario: what depends on a length (collisions, clusters) is shown only if you give it.
 
@@ -154,23 +120,20 @@ def score(
     """
     from airflock.recordings import ReaderProcess
 
-    options.check_writable((series, TABLES))
-    changed = options.parse_settings(changes)
-    if body_length is not None:
+    options.check_writable((o.series, TABLES))
+    files, changed = o.path, options.parse_settings(o.settings)
+    if o.body_length is not None:
         from airflock.recordings import body_length_settings
 
-        changed = body_length_settings(body_length) | changed
+        changed = body_length_settings(o.body_length) | changed
     with ReaderProcess(files[0]) as first:  # another process opens it while this one imports
-        if groups:
-            _print_group_scores([first, *files[1:]], files, changed, trust, as_json)
-            return
-        measured = [
-            _measured(source, path, changed, trust, aero)
-            for source, path in zip([first, *files[1:]], files, strict=True)
-        ]
-        if series is not None:
-            _save_series(measured, series)
-        _print_measured(measured, as_json)
+        sources = [first, *files[1:]]
+        if o.groups:
+            return _print_group_scores(sources, files, changed, o.trust, o.json)
+        measured = [_measured(*each, changed, o.trust, o.aero) for each in zip(sources, files, strict=True)]
+        if o.series is not None:
+            _save_series(measured, o.series)
+        return _print_measured(measured, o.json)
 
 
 def _print_group_scores(
@@ -284,78 +247,43 @@ def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> Non
 MAX_GRID_POINTS = 100_000  # of one key, and points of a whole grid
 
 
-def sweep(
-    ctx: typer.Context,
-    scenario: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="PRESET|FILE", help="A preset or a scenario file; none to --resume a folder.", show_default=False
-        ),
-    ] = None,
-    over: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--over",
-            metavar="KEY=VALUES",
-            help="Values to fly, as a list a,b,c or a range low:high:count; repeat for a grid.",
-            show_default=False,
-        ),
-    ] = None,
-    seeds: options.Seeds = 5,
-    first_seed: options.FirstSeed = 0,
-    changes: options.Set = None,
-    law: options.Law = None,
-    trust: options.Trust = False,
-    agents: options.Agents = None,
-    duration: options.Duration = None,
-    threads: options.Threads = None,
-    precision: options.Precision = 32,
-    device: options.Device = "cpu",
-    scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder that keeps every flight as it lands.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the sweep in the folder.")] = False,
-    table: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Write one row per flight.")] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Draw a heat map (two keys) or a line (one key).")
-    ] = None,
-    show: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Order parameter to show.", show_default="fitness, quality or polarisation"),
-    ] = None,
-) -> None:
+@verb(PANEL, "airflock.sweep", "settings law trust agents duration SEEDS FLYING json table plot show")
+def sweep(o: SimpleNamespace, errors: ErrorCollector) -> None:
     """Fly a scenario over a grid of values and tabulate the order parameters.
+
+    --out keeps every flight as it lands. --plot draws a heat map of two keys, or a line of one.
 
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
     from airflock.recordings import fly_sweep, make_sweep, metric_to_show, resumed_sweep
 
-    errors = options.collect_option_errors(ctx)
-    errors.read(options.check_writable, (table, TABLES), (plot, PICTURES))
-    fixed = options.collect_settings(errors, changes, agents, duration)
-    if scenario is None and (out is None or not resume):
+    errors.read(options.check_writable, (o.table, TABLES), (o.plot, PICTURES))
+    fixed = options.collect_settings(errors, o)
+    if o.scenario is None and (o.out is None or not o.resume):
         errors.note("sweep: give a scenario and --over, or --out DIR --resume")
-    elif scenario is None:
-        made = errors.read(resumed_sweep, out, trust=trust, over=over, settings=fixed, law=law)
+    elif o.scenario is None:
+        made = errors.read(resumed_sweep, o.out, trust=o.trust, over=o.over, settings=fixed, law=o.law)
     else:
-        axes = _axes(over or [], plot, errors)
-        numbers = errors.read(options.seeds_from, first_seed, seeds)
-        made = errors.read(make_sweep, scenario, axes, numbers, fixed, law, precision, device, trust=trust)
-    name = errors.read(lambda found: metric_to_show(show, found.scenarios), made) if scenario or resume else ""
-    errors.read(options.check_flight_options, device, precision, scheduler)
+        axes = _axes(o.over or [], o.plot, errors)
+        numbers = errors.read(options.seeds_from, o.first_seed, o.seeds)
+        seeds = value_or_default(numbers, [0])  # the rest of the sweep is checked although they are wrong
+        made = errors.read(make_sweep, o.scenario, axes, seeds, fixed, o.law, o.precision, o.device, trust=o.trust)
+    name = errors.read(lambda found: metric_to_show(o.show, found.scenarios), made) if o.scenario or o.resume else ""
+    errors.read(options.check_flight_options, o.device, o.precision, o.scheduler)
     errors.raise_errors()
     terminal.print_notes(merge_similar_notes(dict.fromkeys(note for found in made.scenarios for note in found.notes)))
-    if scheduler is None:
-        options.announce_run_time([found for found in made.scenarios for _ in made.seeds], threads, device)
-        options.compile_before_bar(made.scenarios[0], made.precision, device)
-    with counting_parts(f"{made.scenario.name}: flights", len(made.points) * len(made.seeds), quiet=as_json) as done:
+    if o.scheduler is None:
+        options.announce_run_time([found for found in made.scenarios for _ in made.seeds], o.threads, o.device)
+        options.compile_before_bar(made.scenarios[0], made.precision, o.device)
+    with counting_parts(f"{made.scenario.name}: flights", len(made.points) * len(made.seeds), quiet=o.json) as done:
         tidy = fly_sweep(
-            made, out=out, resume=resume, threads=threads, on_done=done, scheduler=scheduler,
+            made, out=o.out, resume=o.resume, threads=o.threads, on_done=done, scheduler=o.scheduler,
             notify=terminal.print_message,
         )  # fmt: skip
-    _keep(tidy, list(made.over), name, made.scenarios[0], table, plot)
-    if as_json:
-        terminal.print_json({"scenario": made.scenario.name, "seeds": len(made.seeds), "runs": tidy.to_dict("records")})
+    _keep(tidy, list(made.over), name, made.scenarios[0], o)
+    if o.json:
+        about = {"scenario": made.scenario.name, "seeds": len(made.seeds)}
+        terminal.print_json({**about, "runs": tidy.to_dict("records")})
     else:
         _print_sweep(tidy, list(made.over), name)
 
@@ -375,18 +303,17 @@ def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
     return dict(axes)
 
 
-def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | None, plot: Path | None) -> None:
+def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, o: SimpleNamespace) -> None:
     """Write the requested table and picture."""
-    if table is not None:
+    if o.table is not None:
         from airflock.support import atomic
 
-        atomic.write_file(table, tidy.to_csv(index=False))
-        terminal.print_message(f"saved {table}")
-    if plot is not None:
-        from airflock.view import heatmap, save_figure
+        atomic.write_file(o.table, tidy.to_csv(index=False))
+        terminal.print_message(f"saved {o.table}")
+    if o.plot is not None:
+        from airflock.view import heatmap
 
-        save_figure(heatmap(tidy, keys, show, scenario=scenario), plot)
-        terminal.print_message(f"saved {plot}")
+        terminal.save_picture(heatmap(tidy, keys, show, scenario=scenario), o.plot)
 
 
 def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
@@ -431,55 +358,18 @@ def parse_axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
 
 
 def _print_sweep(tidy: Any, keys: list[str], show: str) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     grouped = tidy.groupby(keys, sort=False)[show].agg(["mean", "std", "median", "count"]).reset_index()
-    table = Table(title=f"{show} (mean ± sd over seeds)", box=box.SIMPLE_HEAD, title_justify="left")
-    for name in (*keys, show, "median", "flights"):
-        table.add_column(name, justify="right")
+    rows = []
     for row in grouped.to_dict("records"):
         spread = "" if row["count"] < 2 else f" ± {row['std']:.2g}"
         cells = [str(row[key]) if isinstance(row[key], str) else f"{row[key]:g}" for key in keys]
-        table.add_row(*cells, f"{row['mean']:.4g}{spread}", f"{row['median']:.4g}", str(row["count"]))
-    Console().print(table)
+        rows.append((*cells, f"{row['mean']:.4g}{spread}", f"{row['median']:.4g}", str(row["count"])))
+    heads = "; ".join(f">{name}" for name in (*keys, show, "median", "flights"))
+    terminal.print_result(result_table(f"{show} (mean ± sd over seeds)", heads, rows))
 
 
-class PictureKind(StrEnum):
-    """Kinds of picture."""
-
-    TRAJECTORIES = "trajectories"
-    SERIES = "series"
-    RULES = "rules"
-    TRANSFER = "transfer"
-    SCENE = "scene"
-    SPACE = "space"
-    RAYS = "rays"
-    FLOCKED = "flocked"
-    WASH = "wash"
-    RECEPTION = "reception"
-
-
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write; its ending sets the format.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the flight, if a scenario is flown.")]
-Begin = Annotated[float | None, typer.Option(help="First instant shown, s.", show_default="see the picture's title")]
-End = Annotated[float | None, typer.Option(help="Last instant shown, s.", show_default="the end")]
-
-
-def plot(
-    what: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")],
-    kind: Annotated[PictureKind, typer.Option(help="What to draw.")] = PictureKind.TRAJECTORIES,
-    out: Out = Path("flight.png"),
-    seed: Seed = 0,
-    begin: Begin = None,
-    end: End = None,
-    changes: options.Set = None,
-    law: options.Law = None,
-    trust: options.Trust = False,
-    agents: options.Agents = None,
-    duration: options.Duration = None,
-) -> None:
+@verb(PANEL, "airflock.plot", "settings law trust agents duration out")
+def plot(o: SimpleNamespace) -> None:
     """Draw trajectories coloured by speed, order parameters over time, or a model's rules.
 
     In a city, forest or mesh: paths through the scene from above or in space, one agent's rays, share flocked. Also
@@ -487,169 +377,104 @@ def plot(
 
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
-    options.check_writable((out, PICTURES))
+    options.check_writable((o.out, PICTURES))
     from airflock.scenarios import load
-    from airflock.view import plot as picture, save_figure
+    from airflock.view import plot as picture
 
-    settings = options.parse_settings(changes, agents, duration)
-    window: dict[str, Any] = {"start": begin, "stop": end}
-    if what.lower().endswith(".nc"):
-        figure = picture(what, kind, settings=settings, law=law, trust=trust, **window)
+    settings = options.parse_settings(o.settings, o.agents, o.duration)
+    window: dict[str, Any] = {"start": o.start, "stop": o.stop}
+    if o.source.lower().endswith(".nc"):
+        figure = picture(o.source, o.kind, settings=settings, law=o.law, trust=o.trust, **window)
     else:
-        scenario = load(what, settings, law, trust=trust)
+        scenario = load(o.source, settings, o.law, trust=o.trust)
         terminal.print_notes(scenario.notes)
-        figure = picture(scenario, kind, seed=seed, **window)
-    save_figure(figure, out)
-    terminal.print_message(f"saved {out}")
+        figure = picture(scenario, o.kind, seed=o.seed, **window)
+    terminal.save_picture(figure, o.out)
 
 
-def video(
-    source: Annotated[
-        str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")
-    ],
-    out: Out = Path("flight.mp4"),
-    seed: Seed = 0,
-    begin: Begin = None,
-    end: End = None,
-    space: Annotated[
-        bool | None,
-        typer.Option("--space/--above", help="View at an angle, or from above.", show_default="as flown"),
-    ] = None,
-    chart: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME", help="Show this order parameter over time beside the picture.", show_default=False
-        ),
-    ] = "",
-    fps: Annotated[int, typer.Option(min=1, max=120, help="Frames per second.")] = 25,
-    speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Speed relative to real time.")] = 10.0,
-    changes: options.Set = None,
-    law: options.Law = None,
-    trust: options.Trust = False,
-    agents: options.Agents = None,
-    duration: options.Duration = None,
-) -> None:
+@verb(PANEL, "airflock.video", "settings law trust agents duration out", without="recording path")
+def video(o: SimpleNamespace) -> None:
     r"""Make an MP4 or GIF of a flight. Needs pip install 'airflock\[video]'.
 
     Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
-    options.check_writable((out, VIDEOS))
+    options.check_writable((o.out, VIDEOS))
     from airflock.recordings import time_series_names
-    from airflock.scenarios import load
-    from airflock.view import (
-        check_chart,
-        frame_count,
-        import_ffmpeg,
-        naming_file,
-        recording_or_flight,
-        video as make_video,
-    )
+    from airflock.view import check_chart, frame_count, import_ffmpeg, naming_file, video as make_video
 
-    settings = options.parse_settings(changes, agents, duration)
+    def check(scenario: Any) -> None:
+        check_chart(o.chart, time_series_names(scenario) if o.chart else [], scenario.name)
+
     import_ffmpeg()  # before anything flies, as all that can be refused
-    if source.lower().endswith(".nc"):
-        recording = recording_or_flight(source, seed, settings, law, trust=trust)
-    else:
-        scenario = load(source, settings, law, trust=trust)
-        terminal.print_notes(scenario.notes)
-        check_chart(chart, time_series_names(scenario) if chart else [], scenario.name)
-        recording = recording_or_flight(scenario, seed)
-    choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
-    with naming_file(source), counting_parts("pictures", frame_count(recording, **choice)) as done:
-        make_video(recording, out, done=done, space=space, chart=chart, **choice)
-    terminal.print_message(f"saved {out}")
+    recording = _recording(o, check)
+    names = ("fps", "speed", "start", "stop")
+    choice = {name: getattr(o, name) for name in names}
+    with naming_file(o.source), counting_parts("pictures", frame_count(recording, **choice)) as done:
+        make_video(recording, o.out, done=done, space=o.space, chart=o.chart, tail=o.tail, height=o.height, **choice)
+    terminal.print_message(f"saved {o.out}")
 
 
-def replay(
-    source: Annotated[
-        str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")
-    ],
-    page: Annotated[Path, typer.Option("--html", "--out", "-o", metavar="FILE.html", help="File to write.")] = Path(
-        "flight.html"
-    ),
-    seed: Seed = 0,
-    rate: Annotated[float, typer.Option(min=0.1, max=100.0, help="Most frames kept per second.")] = 10.0,
-    colour: Annotated[
-        str, typer.Option(metavar="NAME", help="Colour by speed, heading, agent, cluster, group, fault or a variable.")
-    ] = "speed",
-    changes: options.Set = None,
-    law: options.Law = None,
-    trust: options.Trust = False,
-    agents: options.Agents = None,
-    duration: options.Duration = None,
-) -> None:
+@verb(PANEL, "airflock.replay", "settings law trust agents duration out", without="recording")
+def replay(o: SimpleNamespace) -> None:
     """Write a flight as one HTML file that plays in any browser, from disk and without a network.
 
     Example: airflock replay flight.nc --html show.html --colour cluster
     """
-    options.check_writable((page, PAGES))
+    options.check_writable((o.out, PAGES))
+    from airflock.view import check_colour, naming_file, replay as make_replay
+
+    recording = _recording(o, lambda scenario: check_colour(scenario, o.colour))
+    with naming_file(o.source):
+        page = make_replay(recording, rate=o.rate, colour=o.colour)
+    page.save(o.out)
+    terminal.print_message(f"saved {o.out} ({len(page.text) / 1e6:.1f} MB)")
+
+
+def _recording(o: SimpleNamespace, check: Callable[[Any], None]) -> Any:
+    """Return the recording of a file (.nc), or fly a scenario after a check of what is drawn of it."""
     from airflock.scenarios import load
-    from airflock.view import check_colour, naming_file, recording_or_flight, replay as make_replay
+    from airflock.view import recording_or_flight
 
-    settings = options.parse_settings(changes, agents, duration)
-    if source.lower().endswith(".nc"):
-        recording = recording_or_flight(source, seed, settings, law, trust=trust)
-    else:
-        scenario = load(source, settings, law, trust=trust)
-        terminal.print_notes(scenario.notes)
-        check_colour(scenario, colour)
-        recording = recording_or_flight(scenario, seed)
-    with naming_file(source):
-        replay_page = make_replay(recording, rate=rate, colour=colour)
-    replay_page.save(page)
-    terminal.print_message(f"saved {page} ({len(replay_page.text) / 1e6:.1f} MB)")
+    settings = options.parse_settings(o.settings, o.agents, o.duration)
+    if o.source.lower().endswith(".nc"):
+        return recording_or_flight(o.source, o.seed, settings, o.law, trust=o.trust)
+    scenario = load(o.source, settings, o.law, trust=o.trust)
+    terminal.print_notes(scenario.notes)
+    check(scenario)
+    return recording_or_flight(scenario, o.seed)
 
 
-def display(
-    shapes: Annotated[
-        list[str],
-        typer.Argument(metavar="SHAPE...", help="Images, meshes (stl, obj, glb) or texts, shown one after another."),
-    ],
-    drones: Annotated[int, typer.Option(min=2, max=2000, help="Number of drones.")] = 200,
-    failing: Annotated[float, typer.Option(help="Share of the drones that fail on the way, 0 to 0.9.")] = 0.0,
-    failure: Annotated[
-        str, typer.Option(help="What a failing drone does: fall, hover, or both (taking turns).")
-    ] = "both",
-    points: Annotated[int | None, typer.Option(min=2, help="Points per shape.", show_default="one per drone")] = None,
-    spacing: Annotated[float, typer.Option(min=2.5, max=100.0, help="Smallest distance between two points, m.")] = 3.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of failures and noise.")] = 0,
-    changes: options.Set = None,
-    as_json: options.Json = False,
-    save: options.SaveFile = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw every shape as it was formed.")] = None,
-) -> None:
+@verb(PANEL, "airflock.display", "settings json save plot")
+def display(o: SimpleNamespace, errors: ErrorCollector) -> None:
     """Fly a drone display: assign points to drones, again when some fail, and print how well each shape was formed.
+
+    --plot draws every shape as it was formed.
 
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """
     from airflock.displays import fly_show, plan_shapes
 
-    errors: list[str] = []
-    with collect_errors(errors):
-        options.check_writable((save, RECORDINGS), (plot, PICTURES), reads=shapes)
-    settings: dict[str, Any] = {}
-    with collect_errors(errors):
-        settings = options.parse_settings(changes)
-    layouts = []
-    with collect_errors(errors):
-        layouts = plan_shapes(shapes, drones, failing, failure, points, spacing, settings, "--")
-    options.raise_errors(errors)
-    show = fly_show(layouts, drones, failing, failure, seed, settings)
-    rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.shape_reports, strict=True)]
-    if save is not None:
+    errors.read(options.check_writable, (o.save, RECORDINGS), (o.plot, PICTURES), reads=o.shapes)
+    settings = errors.read(options.parse_settings, o.settings)
+    failure = value_or_default(o.failure, "both")
+    wanted = (o.shapes, o.drones, o.failing, failure, o.points, o.spacing)
+    layouts = errors.read(plan_shapes, *wanted, value_or_default(settings, {}), "--")
+    errors.raise_errors()
+    show = fly_show(layouts, o.drones, o.failing, o.failure, o.seed, settings)
+    rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(o.shapes, show.shape_reports, strict=True)]
+    if o.save is not None:
         from airflock.displays import recording_of
         from airflock.recordings import save as save_recording
 
-        terminal.print_message(f"saved {save_recording(recording_of(show), save)}")
-    if plot is not None:
-        from airflock.view import save_figure, stood
+        terminal.print_message(f"saved {save_recording(recording_of(show), o.save)}")
+    if o.plot is not None:
+        from airflock.view import stood
 
-        save_figure(stood(show, shapes), plot)
-        terminal.print_message(f"saved {plot}")
-    if as_json:
-        terminal.print_json({"drones": drones, "failing": failing, "failure": failure, "seed": seed, "shapes": rows})
-        return
-    _print_display(rows)
+        terminal.save_picture(stood(show, o.shapes), o.plot)
+    if o.json:
+        about = {name: getattr(o, name) for name in ("drones", "failing", "failure", "seed")}
+        return terminal.print_json({**about, "shapes": rows})
+    return _print_display(rows)
 
 
 def _print_display(rows: list[dict[str, Any]]) -> None:
@@ -661,51 +486,18 @@ def _print_display(rows: list[dict[str, Any]]) -> None:
     names = {
         "time": "formed\nafter (s)", "error": "error\n(m)", "worst": "worst\n(m)", "drones": "drones",
         "collisions": "hit\nflying", "hulls": "hit\nhovering", "struck": "hit by\nfalling",
-        "reassigned": "points\nanew",
+        "reassignment_count": "points\nanew",
     }  # fmt: skip
     table.add_column("shape", overflow="fold")
     for title in names.values():
         table.add_column(title, justify="right", no_wrap=True)
     for row in rows:
-        table.add_row(row["shape"], *(terminal.format_number(float(row[key])) for key in names))
+        table.add_row(row["shape"], *(format_cell(float(row[key])) for key in names))
     Console().print(table)
 
 
-def watch(
-    scenario: Annotated[
-        str,
-        typer.Argument(
-            metavar="PRESET|FILE",
-            help="A preset, a scenario file, a recording (.nc) to fly again, or the flight card (.json) of a fleet.",
-        ),
-    ],
-    changes: options.Set = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the flight.")] = 0,
-    law: options.Law = None,
-    trust: options.Trust = False,
-    agents: options.Agents = None,
-    against: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PRESET|FILE|KEY=VALUE",
-            help="Fly this beside it, with the same seed and noise; repeatable for keys.",
-        ),
-    ] = None,
-    host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines in.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 picks a free one.")] = 8080,
-    radio: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PORT",
-            help="For a fleet: where to receive its packets; repeatable.",
-            show_default="udp:127.0.0.1:14600, as airflock fleet --card uses",
-        ),
-    ] = None,
-    key: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="For a fleet: the mission's key.", show_default="beside the card, .key"),
-    ] = None,
-) -> None:
+@verb(PANEL, "airflock.watch", "settings law trust agents")
+def watch(o: SimpleNamespace) -> None:
     """Open a page that flies a scenario live: play it, turn its sliders, select agents, save what you found.
 
     With --against, two laws or sets of parameters fly side by side. Given a flight card, the page shows its fleet, in
@@ -718,8 +510,9 @@ def watch(
     from airflock.studio import watch as open_page
 
     open_page(
-        scenario, options.parse_settings(changes, agents), seed, law=law, trust=trust, host=host, port=port,
-        against=_comparison(against or []), radios=radio or [], key=key, say=terminal.print_message,
+        o.scenario, options.parse_settings(o.settings, o.agents), o.seed, law=o.law, trust=o.trust, host=o.host,
+        port=o.port, against=_comparison(o.against or []), radios=o.radios or [], key=o.key,
+        say=terminal.print_message,
     )  # fmt: skip
 
 

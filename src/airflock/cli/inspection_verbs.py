@@ -1,30 +1,34 @@
 """Verbs presets, validate, doctor, keys and types: list scenarios and their keys, check files and this machine."""
 
 import tomllib
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from airflock.cli import options, terminal
+from airflock.cli.command import verb
 from airflock.support import AirflockError, as_error, collect_errors, printable, read_text
 
 if TYPE_CHECKING:
     from airflock.scenarios import Key
 
 
-def presets(
-    name: Annotated[
-        str | None, typer.Argument(metavar="PRESET", help="Show one preset in full.", show_default=False)
-    ] = None,
-    for_speed: Annotated[
-        float | None, typer.Option(min=0.1, max=100.0, help="Print a starting set for this speed, m/s.")
-    ] = None,
-    as_json: options.Json = False,
-) -> None:
+PANEL = "Look something up"
+
+
+@verb(PANEL, shared="json")
+def presets(name: str | None = None, *, for_speed: float | None = None, json: bool = False) -> None:
     """List the presets, show one as TOML, or derive a starting set for a speed (--for-speed 12 > mine.toml).
 
     Example: airflock presets vasarhelyi_2018/4ms
+
+    Parameters
+    ----------
+    name : str (PRESET), optional
+        Show one preset in full.
+    for_speed : float in [0.1, 100], optional
+        Print a starting set for this speed, m/s.
     """
     from airflock.scenarios import files
 
@@ -32,21 +36,19 @@ def presets(
     if for_speed is not None:
         from airflock.scenarios import starting_set
 
-        _show(starting_set(for_speed), as_json)
-        return
+        return _show(starting_set(for_speed), json)
     if name is not None:
         files.load(name)  # nothing but a scenario is printed: a name may be a link to any file of this computer
         with as_error(name):
             text = read_text(known.get(name) or name)
-        _show(text, as_json)
-        return
+        return _show(text, json)
     titles = {key: str(files.load(key).document.get("title", "")) for key in known}
-    if as_json:
-        terminal.print_json(titles)
-        return
+    if json:
+        return terminal.print_json(titles)
     width = max(len(key) for key in titles)
     for key, title in titles.items():
         typer.echo(f"{key:<{width}}  {title}")
+    return None
 
 
 def _show(text: str, as_json: bool) -> None:
@@ -57,37 +59,30 @@ def _show(text: str, as_json: bool) -> None:
         typer.echo("".join(c if c in "\n\t" else printable(c) for c in text), nl=False)
 
 
-def validate(
-    files: Annotated[
-        list[str], typer.Argument(metavar="FILE...", help="Scenario files, presets, studies or recordings.")
-    ],
-    changes: options.Set = None,
-    law: options.Law = None,
-    trust: options.Trust = False,
-    as_json: options.Json = False,
-) -> None:
+@verb(PANEL, "airflock.validate", "settings law trust json")
+def validate(o: SimpleNamespace) -> None:
     """Check scenario and study files (every error at once), or fly a recording again and compare the bits.
 
     With --json, each file has a verdict (null if it is wrong), its faults and its notes. Exit status 2 if any is wrong.
 
     Example: airflock validate mine.toml
     """
-    changed = options.parse_settings(changes)
+    changed = options.parse_settings(o.settings)
     checked = []
-    for name in files:
-        entry = _checked(name, changed, law, trust)
+    for name in map(str, o.name):
+        entry = _checked(name, changed, o.law, o.trust)
         checked.append(entry)
-        if not as_json and entry["verdict"] is not None:
+        if not o.json and entry["verdict"] is not None:
             for note in entry["notes"]:
                 terminal.print_message(f"note: {name}: {note}")
             typer.echo(f"{name}: {entry['verdict']}")
     errors = [error for entry in checked for error in entry["faults"]]
-    if not as_json:
-        options.raise_errors(errors)
-        return
+    if not o.json:
+        return options.raise_errors(errors)
     terminal.print_json({"files": checked})
     if errors:
         raise typer.Exit(2)
+    return None
 
 
 def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> dict[str, Any]:
@@ -106,19 +101,17 @@ def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -
     }
 
 
-def doctor(
-    clear: Annotated[bool, typer.Option("--clear-cache", help="Only remove all compiled drivers.")] = False,
-    as_json: options.Json = False,
-) -> None:
+@verb(PANEL, "airflock.doctor", "json")
+def doctor(o: SimpleNamespace) -> None:
     """Show versions, cores, extras, GPUs and cache, and fly a ten-second self-check on each device.
 
     Example: airflock doctor
     """
-    if clear:
+    if o.clear:
         from airflock.support import clear_cache, default_cache_folder
 
         count, size = clear_cache()
-        if as_json:
+        if o.json:
             terminal.print_json(
                 {"cache": str(default_cache_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)}
             )
@@ -128,7 +121,7 @@ def doctor(
     from airflock.recordings import doctor as examine
 
     found = examine()
-    if as_json:
+    if o.json:
         terminal.print_json(found)
     else:
         for key, text in found.items():
@@ -138,42 +131,29 @@ def doctor(
         raise AirflockError(f"self-check {'; '.join(failed)}")
 
 
-def keys(
-    section: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="SECTION|KIND|KEY",
-            help="For instance radio, couzin_2002, faults, motor, top, or delay.",
-            show_default=False,
-        ),
-    ] = None,
-    schema: Annotated[
-        bool, typer.Option("--schema", help="A JSON schema of scenario files, by which editors complete keys.")
-    ] = False,
-    as_json: options.Json = False,
-) -> None:
+@verb(PANEL, "airflock.keys", "json")
+def keys(o: SimpleNamespace) -> None:
     """List the sections of a scenario file, or every key of one: meaning, unit, range, default and source.
 
     Example: airflock keys radio
     """
     from airflock.scenarios import keys as known
 
-    if schema:
-        if section is not None:
-            raise AirflockError(f"--schema is of a whole file; leave {section} out")
-        terminal.print_json(known.json_schema())
-        return
-    listed_keys = known.keys(section)
-    if as_json:
+    if o.schema:
+        if o.section is not None:
+            raise AirflockError(f"--schema is of a whole file; leave {o.section} out")
+        return terminal.print_json(known.json_schema())
+    listed_keys = known.keys(o.section)
+    if o.json:
         terminal.print_json([{**key._asdict(), "options": list(key.options)} for key in listed_keys])
-        return
-    if section is None:
+    elif o.section is not None:
+        _print_keys(listed_keys)
+    else:
         width = max(map(len, known.sections()))
         for name, listed in known.sections().items():
             count = len(listed.keys)
             typer.echo(f"{name:<{width}}  {count:>2} key{'s' if count != 1 else ' '}  {listed.about}")
-        return
-    _print_keys(listed_keys)
+    return None
 
 
 def _print_keys(listed_keys: "list[Key]") -> None:
@@ -191,15 +171,12 @@ def _print_keys(listed_keys: "list[Key]") -> None:
         console.print(Padding(Text.assemble(key.meaning, (source, "dim")), (0, 0, 0, 4)))
 
 
-def types(
-    files: Annotated[list[str] | None, typer.Argument(metavar="FILE.py...", help="Not read.")] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Not written.")] = None,
-    as_json: options.Json = False,
-) -> None:
+@verb(PANEL, "airflock.check_types", "json")
+def types(o: SimpleNamespace) -> None:
     """Removed: use mypy, and airflock.check_model in Python.
 
     Example: airflock types mine.py
     """
     from airflock.check import check_types
 
-    check_types(files or (), out=out)
+    check_types(o.files or (), out=o.out)

@@ -4,27 +4,27 @@ import _thread
 import atexit
 import gc
 import os
+import pkgutil
 import signal
 import sys
 import threading
 import traceback
 import warnings
 from bdb import BdbQuit
-from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Annotated, Any, Literal, NoReturn
 
 import typer
-from typer.core import TyperGroup
+from typer.completion import completion_init, get_completion_script  # type: ignore[attr-defined]
 
 from airflock import __version__
-from airflock.cli.command import VerbCommand, expand_home, usage_error
-from airflock.cli.drone_verbs import fleet, fly_app
-from airflock.cli.estimate_verbs import export, identify, import_tracks, infer
-from airflock.cli.flight_verbs import display, plot, replay, run, score, sweep, video, watch
-from airflock.cli.inspection_verbs import doctor, keys, presets, types, validate
-from airflock.cli.papers import paper_verb
-from airflock.cli.search_verbs import certify, evolve, harden, tune
+from airflock.cli.command import GroupOfVerbs, expand_home, usage_error
+from airflock.cli.drone_verbs import fly_app
 from airflock.support import AirflockError, os_error_message, printable, shortened, shortened_lines
+
+for _module in pkgutil.iter_modules(sys.modules[__name__.rpartition(".")[0]].__path__):  # each registers its verbs
+    import_module(f"airflock.cli.{_module.name}")
 
 PROGRAM_HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 
@@ -33,9 +33,10 @@ Try [bold]airflock run vasarhelyi_2018/4ms[/bold]. Every verb has --help with an
 
 
 INTERRUPT_DELAY = 0.05  # s
+COMPLETION_VARIABLE = "_AIRFLOCK_COMPLETE"  # of the environment, in which a shell asks what may follow
 
 
-class VerbGroup(TyperGroup):
+class VerbGroup(GroupOfVerbs):
     """Group of the verbs; a wrong command line and Ctrl-C end like any other error, with one line and status 2."""
 
     def main(
@@ -48,9 +49,10 @@ class VerbGroup(TyperGroup):
         **extra: Any,
     ) -> Any:
         """Run a command line; raise an AirflockError where it is wrong."""
+        completion_init()  # typer's own classes for shells, which its scripts expect
         words = [expand_home(word) for word in (sys.argv[1:] if args is None else args)]
         try:
-            result = super().main(words, prog_name, complete_var, False, windows_expand_args, **extra)
+            result = super().main(words, prog_name, COMPLETION_VARIABLE, False, windows_expand_args, **extra)
         except typer.Abort as stop:
             raise AirflockError("interrupted") from stop
         except Exception as error:
@@ -80,31 +82,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-VERBS_BY_PANEL: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
-    "Fly, measure, look": {
-        "run": run, "watch": watch, "plot": plot, "video": video, "replay": replay,
-        "score": score, "sweep": sweep, "display": display,
-    },
-    "Search and make safe": {
-        "evolve": evolve, "harden": harden, "certify": certify,
-        "tune": tune,
-    },
-    "Recordings of others": {
-        "import": import_tracks, "identify": identify, "infer": infer,
-        "export": export,
-    },
-    "Towards real drones": {"fleet": fleet, "fly": fly_app},
-    "Look something up": {
-        "presets": presets, "keys": keys, "validate": validate, "types": types,
-        "paper": paper_verb, "doctor": doctor,
-    },
-}  # fmt: skip
-for _panel, _verbs in VERBS_BY_PANEL.items():
-    for _name, _verb in _verbs.items():
-        if isinstance(_verb, typer.Typer):
-            app.add_typer(_verb, name=_name, rich_help_panel=_panel)
-        else:
-            app.command(_name, cls=VerbCommand, rich_help_panel=_panel)(_verb)
+app.add_typer(fly_app, name="fly", rich_help_panel="Towards real drones")
 
 
 def _version(is_requested: bool) -> None:
@@ -113,8 +91,23 @@ def _version(is_requested: bool) -> None:
         raise typer.Exit
 
 
+def _show_completion(shell: str | None) -> None:
+    if shell is not None:
+        typer.echo(get_completion_script(prog_name="airflock", complete_var=COMPLETION_VARIABLE, shell=shell))
+        raise typer.Exit
+
+
 @app.callback()
 def _root_callback(
+    show_completion: Annotated[
+        Literal["bash", "zsh", "fish"] | None,
+        typer.Option(
+            callback=_show_completion,
+            is_eager=True,
+            show_default=False,
+            help="Print what lets a shell complete commands, options, presets, keys and choices.",
+        ),
+    ] = None,
     version: bool = typer.Option(
         False, "--version", callback=_version, is_eager=True, help="Show the version and stop."
     ),

@@ -3,11 +3,13 @@
 from collections import Counter
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from types import SimpleNamespace
+from typing import Any
 
 import typer
 
-from airflock.cli import options, terminal
+from airflock.cli import terminal
+from airflock.cli.command import verb
 from airflock.support import AirflockError
 
 PACKAGE = "airflock_papers"  # imported when a paper is recomputed: Airflock flies without it
@@ -27,15 +29,15 @@ def paper(
 
     Parameters
     ----------
-    name : str
-        A publication, for instance "vasarhelyi_2018".
+    name : str (NAME)
+        A publication, for instance vasarhelyi_2018; for a command also all.
     only : str, optional
-        One part only, for instance "s2".
+        Recompute only this part, for instance s2 or fig1; by default all.
     quick : bool
-        A coarse form with few seeds.
-    seeds : int, optional
+        Use the small form, with few seeds.
+    seeds : int in [2, inf], optional
         Flights per number; by default the paper's.
-    threads : int, optional
+    threads : int in [1, inf], optional
         Flights side by side; by default one per core.
 
     Returns
@@ -76,22 +78,8 @@ def require_papers() -> None:
         raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from error
 
 
-def paper_verb(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A publication, for instance vasarhelyi_2018; or all.")],
-    only: Annotated[
-        str | None, typer.Option(help="Recompute only this part, for instance s2 or fig1.", show_default="all")
-    ] = None,
-    quick: Annotated[bool, typer.Option(help="Use the small form, with few seeds.")] = False,
-    seeds: Annotated[int | None, typer.Option(min=2, help="Flights per number.", show_default="the paper's")] = None,
-    breaks: Annotated[
-        bool, typer.Option(help="For each claim, make the change that must turn it red, and judge it again.")
-    ] = False,
-    keep: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="For all: folder for finished work.", show_default="the cache")
-    ] = None,
-    threads: options.Threads = None,
-    as_json: options.Json = False,
-) -> None:
+@verb("Look something up", "airflock.paper", "breaks keep json", name="paper")
+def paper_verb(o: SimpleNamespace) -> None:
     """Recompute a paper's numbers and figures; print each claim with its verdict.
 
     Needs airflock-papers; in a clone of the repository: pip install -e ./papers
@@ -102,28 +90,24 @@ def paper_verb(
 
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """
-    if name == "all":
-        _all(quick, breaks, keep, threads, as_json, {"--only": only, "--seeds": seeds})
-        return
-    if breaks:
-        _breaks(name, only, seeds, threads, as_json)
-        return
+    if o.name == "all":
+        return _all(o.quick, o.breaks, o.keep, o.threads, o.json, {"--only": o.only, "--seeds": o.seeds})
+    if o.breaks:
+        return _breaks(o.name, o.only, o.seeds, o.threads, o.json)
 
-    claims = paper(name, only=only, quick=quick, seeds=seeds, threads=threads)
-    if as_json:
-        terminal.print_json([claim.as_dict() for claim in claims])
-        return
+    claims = paper(o.name, only=o.only, quick=o.quick, seeds=o.seeds, threads=o.threads)
+    if o.json:
+        return terminal.print_json([claim.as_dict() for claim in claims])
     from airflock_papers.claims import print_claims
 
-    print_claims(claims)
+    return print_claims(claims)
 
 
 def _all(
     quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
 ) -> None:
     """Recompute every paper: in its small form, or every claim under its change, against the committed verdicts."""
-    from airflock.cli.papers import require_papers
-    from airflock.support import AirflockError, cache_folder
+    from airflock.support import cache_folder
 
     require_papers()
     from airflock_papers import quick as tier
@@ -175,12 +159,10 @@ def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
 
 def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
     """Check each claim under the change that must break it."""
-    from airflock.cli.papers import find_paper
-
-    paper_verb = find_paper(name)
+    publication = find_paper(name)
     from airflock_papers import breaks
 
-    rows = breaks.fly(paper_verb, only=only, seeds=seeds, threads=threads)
+    rows = breaks.fly(publication, only=only, seeds=seeds, threads=threads)
     if as_json:
         terminal.print_json([row._asdict() for row in rows])
     else:

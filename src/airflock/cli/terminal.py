@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any, Protocol
 
+from airflock.support import format_cell
+
 
 def column_statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return mean, standard deviation and median of each column; of a column of lists, those of each place.
@@ -35,15 +37,6 @@ def _moments(numbers: Sequence[Any]) -> tuple[float, float, float]:
     mean = math.fsum(values) / n
     spread = math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (n - 1)) if n > 1 else 0.0
     return mean, spread, 0.5 * (values[(n - 1) // 2] + values[n // 2])
-
-
-def format_number(x: Any, missing: str = "never") -> str:
-    """Format a number with four significant digits, `missing` where it is nan (a time's `never`); a list side by
-    side.
-    """
-    if isinstance(x, (list, tuple)):
-        return ", ".join(f"{v:.3g}" if v == v else missing for v in x)
-    return f"{x:.4g}" if x == x else missing
 
 
 def print_score_table(
@@ -74,15 +67,15 @@ def print_score_table(
     for key in [key for key in summary["mean"] if key not in untold]:
         unit, meaning = units_and_meanings.get(key, ("", ""))
         missing = "never" if key.startswith("time_to_") else "nan"  # only an event can never happen
-        mean = format_number(summary["mean"][key], missing)
+        mean = format_cell(summary["mean"][key], missing)
         spread = summary["std"][key]
         single = len(rows) == 1 or isinstance(spread, list) or spread != spread
         cells = [key, mean if single else f"{mean} ± {spread:.2g}"]
-        cells += [format_number(summary["median"][key], missing)] if len(rows) > 1 else []
+        cells += [format_cell(summary["median"][key], missing)] if len(rows) > 1 else []
         if published:
             entry = published.get(key)
             spread = "" if entry is None or entry[1] is None else f" ± {entry[1]:.2g}"
-            cells += ["" if entry is None else f"{format_number(entry[0])}{spread}"]
+            cells += ["" if entry is None else f"{format_cell(entry[0])}{spread}"]
         table.add_row(*cells, unit, meaning)
     Console().print(table)
     if untold:
@@ -100,6 +93,24 @@ def _is_unmeasured(key: str, mean: Any) -> bool:
 def print_json(value: Any) -> None:
     """Print JSON on one line; numbers that are no JSON (never expected) become null."""
     sys.stdout.write(json.dumps(to_json_value(value), ensure_ascii=False) + "\n")
+
+
+def print_result(result: Any, as_json: bool = False) -> None:
+    """Print what a verb returned: as it prints itself, or one JSON object of its `document()` or its plain values."""
+    if as_json:
+        print_json(result.document() if hasattr(result, "document") else result)
+    else:
+        from rich.console import Console
+
+        Console().print(result, crop=False)
+
+
+def save_picture(figure: Any, path: Any) -> None:
+    """Write a figure and print where it is."""
+    from airflock.view import save_figure
+
+    save_figure(figure, path)
+    print_message(f"saved {path}")
 
 
 def to_json_value(value: Any) -> Any:

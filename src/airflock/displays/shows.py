@@ -241,19 +241,19 @@ def display(
 
     Parameters
     ----------
-    shapes : sequence of str
+    shapes : sequence of str (SHAPE...)
         Images, meshes (stl, obj, glb) or texts, shown one after another.
-    drones : int
+    drones : int in [2, 2000]
         Number of drones.
     failing : float
         Share of the drones that fail on the way, 0 to 0.9.
-    failure : str
+    failure : {"both", "fall", "hover"}
         What a drone that fails does: "fall", "hover", or "both" in turns.
-    points : int, optional
+    points : int in [2, inf], optional
         Points of a shape; by default one per drone.
-    spacing : float
+    spacing : float in [2.5, 100]
         Smallest distance between two points, m.
-    seed : int
+    seed : int in [0, inf]
         Seed of failures and noise.
     settings : mapping, optional
         Keys of the scenario, such as {"wind.gust": 2.0}.

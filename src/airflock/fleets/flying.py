@@ -22,7 +22,7 @@ from airflock.support import ScenarioError, collect_errors, expand_path, suggest
 
 VEHICLE_KINDS = ("px4", "ardupilot")
 VEHICLE_BODIES = ("multirotor", "quadrotor", "autopilot")
-LOCKSTEP_MODE = FLEET_MODES[0]
+LOCKSTEP_MODE = "lockstep"
 FIRST_CLIENT_PORT = 14540  # port where the first vehicle contacts a client
 
 
@@ -123,27 +123,27 @@ def fleet(
         Keys of the scenario to change, such as {"agents": 5, "duration": 60.0}.
     trust : bool
         Whether code that the file names may run.
-    vehicle : str
+    vehicle : {"px4", "ardupilot"}
         Autopilot that the vehicles imitate: px4 or ardupilot.
-    body : str, optional
+    body : {"multirotor", "quadrotor", "autopilot"}, optional
         How the vehicles move: multirotor, quadrotor or autopilot; by default as the scenario says, but imitations of
         ArduPilot that fly a preset move as ArduCopter at its defaults was measured to (autopilot).
-    mode : str
+    mode : {"lockstep", "tasks", "processes"}
         lockstep: on a virtual clock, the same bits each time. tasks, processes: on the real clock over UDP on this
         computer, in one process or with a process for each node and each vehicle.
-    join : int
+    join : int in [1024, 65000]
         On the real clock: port where the first vehicle contacts MAVSDK, MAVProxy or QGroundControl; the others use
         the next ones.
-    faults : str or path, optional
+    faults : str or path (FILE.toml), optional
         A TOML file of faults to inject, tables [[fault]].
     beside : bool
         Fly the simulator beside it, and compare.
     silence : bool, optional
-        Whether a drone stops while a neighbour that is lost could be near; by default yes, but beside the simulator
+        Stop while a neighbour that is lost could be near; by default yes, but beside the simulator
         as its silence.rule says.
     ground : bool
         Take off, gather, flock, return and land, instead of starting in the air.
-    card : str or path, optional
+    card : str or path (FILE.json), optional
         On the real clock: file (.json) for the flight card, its key beside it; `airflock.watch` of it shows the fleet.
     done : callable, optional
         Called after each second that is flown.

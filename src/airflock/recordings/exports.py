@@ -20,11 +20,11 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
 
     Parameters
     ----------
-    recording : xarray.Dataset
-        (time, space, keypoint, individual), simulated, flown, imported or loaded.
+    recording : xarray.Dataset (FILE.nc)
+        A recording (time, space, keypoint, individual), simulated, flown, imported or loaded.
     path : str or path
         File to write; its ending decides: .csv, .parquet or .nc.
-    layout : str
+    layout : {"movement", "movement-0.16", "px4"}
         Names of the dimensions of .nc: movement, or movement-0.16 for releases up to 0.16. Of .csv px4: microseconds
         and north-east-down, with the fields of a PX4 log.
 

@@ -73,9 +73,9 @@ def load_recording(path: str | os.PathLike[str] | ReaderProcess) -> xr.Dataset:
 
     Parameters
     ----------
-    path : str, path or Opening
-        A netCDF file with position (time, space, keypoint, individual), m, and the time in s; or the Opening that has
-        begun to read it.
+    path : str, path or Opening (FILE.nc...)
+        A recording: a netCDF file with position (time, space, keypoint, individual), m, and the time in s; or an
+        Opening that has begun to read one.
 
     Returns
     -------

@@ -67,11 +67,11 @@ def score(
     scheduler : str, optional
         Address of a dask scheduler whose workers fly, instead of this process.
     aero : bool
-        For a recording, measure the power that its geometry saves.
+        For a recording, measure the power saved by flying in each other's upwash; wing.span and the like set the wing.
     groups : bool
         For a recording, one row for all, one for each group of its scenario, and one for what is between each two.
-    body_length : float, optional
-        For tracks, length of a body in m, by which it is judged who is near; see `airflock.recordings.scores`.
+    body_length : float (METRES), optional
+        For tracks, length of a body in m, which sets what counts as near; see `airflock.recordings.scores`.
     trust : bool
         Whether code that a file or settings name may run, such as {"metrics.kind": "mine.py"}.
 

@@ -61,10 +61,11 @@ def sweep(
 
     Parameters
     ----------
-    scenario : Scenario, str or path, optional
+    scenario : Scenario, str or path (PRESET|FILE), optional
         A scenario, or the name of a preset or scenario file; none to continue what a folder holds.
-    over : mapping
-        Keys and the values that each takes; several keys make a grid.
+    over : mapping (KEY=VALUES), optional
+        Keys and the values that each takes; several keys make a grid. For a command a list KEY=a,b,c or a range
+        KEY=low:high:count; repeatable.
     seeds : int or iterable of int
         Number of flights at each point, or their seeds; the same at all points, so that differences are paired.
     settings : mapping, optional
@@ -85,7 +86,7 @@ def sweep(
         Called with the choice of auto.
     scheduler : str, optional
         Address of a dask scheduler whose workers fly, instead of this process.
-    out : str or path, optional
+    out : str or path (DIR), optional
         Folder that keeps every flight as it lands, and the table as result.csv.
     resume : bool
         Continue the sweep in the folder, which holds scenario, grid and seeds.

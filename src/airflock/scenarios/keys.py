@@ -125,7 +125,7 @@ def keys(section: str | None = None) -> list[Key]:
 
     Parameters
     ----------
-    section : str, optional
+    section : str (SECTION|KIND|KEY), optional
         A section ("radio"), "model", "body", "sensors" or "faults" for all models, bodies, sensors or kinds of fault,
         one of them or of the radios by its name ("couzin_2002", "gnss", "jitter", "motor"), "top" for the keys before
         the first section, or a key ("radio.delay", "delay"). By default all.

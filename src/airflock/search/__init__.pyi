@@ -21,6 +21,7 @@ from .optimisers import (
     decode as decode,
     minimise_over_bits as minimise_over_bits,
 )
+from .search_settings import SearchSettings as SearchSettings
 from .study import load_study as load_study
 from .study_result import (
     BEST_FILE as BEST_FILE,

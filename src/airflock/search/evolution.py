@@ -70,11 +70,11 @@ def evolve(
 
     Parameters
     ----------
-    scenario : str, path, Scenario or Study, several scenarios, or None
+    scenario : str, path, Scenario or Study, several scenarios, or None (PRESET|FILE)
         A preset, a scenario or study file, a Scenario, or a Study. Of a list of presets, files and Scenarios one set
         of numbers is searched that flies in all of them. None continues what the folder holds.
         of numbers is searched that flies in all of them.
-    out : str or path
+    out : str or path (DIR)
         The study's folder.
     resume : bool
         Continue the study in the folder to the identical end; nothing else has to be given but a function `fitness`.
@@ -100,7 +100,7 @@ def evolve(
         cpu, cuda, or auto.
     timeout : float, optional
         Time that a flight may take on a dask worker, s.
-    sensitivity : str
+    sensitivity : str (METHOD)
         "sobol" or "morris": also measure which parameters matter; table sensitivity.csv.
     watch : callable, optional
         Called with an `airflock.runs.RunProgress` after each flight.
@@ -338,7 +338,7 @@ def validate(
 
     Parameters
     ----------
-    name : str or path
+    name : str or path (FILE...)
         A preset, a scenario file, a study file, or a recording (.nc).
     settings : mapping, optional
         Keys to change before the check. Of a recording only {"metrics.kind": "mine.py"} and the like: the file of what

@@ -36,7 +36,7 @@ from airflock.runs import (
     run_folder,
     to_toml_values,
 )
-from airflock.scenarios import Scenario, formats, load_if_named, rebuilt
+from airflock.scenarios import Scenario, check_seeds, formats, load_if_named, rebuilt
 from airflock.search.generations import ZERO_FITNESS, zero_fitness_reason
 from airflock.search.limit_excess import allowed_probability, limit_excess
 from airflock.search.objectives import read_limits
@@ -505,7 +505,7 @@ MAX_ROUNDS = 22  # rounds of flights, with all whole and half steps, the fresh s
 
 def harden(
     scenario: Scenario | str | os.PathLike[str] | Sequence[Scenario | str | os.PathLike[str]],
-    seeds: Sequence[int] = range(100),
+    seeds: int | Sequence[int] = range(100),
     *,
     steps: Sequence[HardeningStep] = TABLE_S4_STEPS,
     cost: float = COST,
@@ -518,15 +518,16 @@ def harden(
 
     Parameters
     ----------
-    scenario : Scenario, str or path
+    scenario : Scenario, str or path (FILE|PRESET|DIR)
         An optimum: a scenario, or its name or file, such as best.toml of a study. Of several, which hold the same
         numbers of the law, a step must keep the constraints in each; means are over all of them.
-    seeds : sequence of int
-        Seeds of the flights of each step; the result is judged on three times as many seeds after the largest of them.
+    seeds : int in [2, 1000000] or sequence of int
+        Number of flights of each step, with seeds 0, 1, 2, ..., or the seeds themselves; the result is judged on three
+        times as many seeds after the largest of them.
     steps : sequence of Step
         Steps to try, one after another. Earlier braking is added if agents touch walls or obstacles; it comes first if
         walls are the larger problem.
-    cost : float
+    cost : float in [0, inf]
         Fitness, 0 to 1, that may be given up in all; a step towards limits that are not kept yet may cost more.
     limit : str or sequence of str
         Events and their largest rates, as `airflock.certify` has them. A step must not raise the estimated probability
@@ -535,7 +536,7 @@ def harden(
         Flights side by side; by default one per core.
     done : callable, optional
         Called after each flight.
-    folder : str or path, optional
+    folder : str or path (DIR), optional
         Folder that keeps every flight, in which a hardening that was interrupted goes on.
 
     Returns
@@ -550,6 +551,8 @@ def harden(
     ScenarioError
         If the model has no such parameters, the flights have no fitness, the optimum does not fly, or a limit cannot
         be read.
+    ParameterError
+        If `seeds` are neither a number of flights nor seeds.
     StudyError, Interrupted
         If the folder holds something else, or a flight fails; at Ctrl-C.
 
@@ -563,7 +566,7 @@ def harden(
     """
     single = isinstance(scenario, (Scenario, str, os.PathLike))
     scenarios = [load_if_named(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
-    work = Hardening(scenarios, seeds, steps, hardening_request(scenarios, cost, limit))
+    work = Hardening(scenarios, check_seeds(seeds), steps, hardening_request(scenarios, cost, limit))
     optimum = recipe_parameters(scenarios[0], steps)[0]
     with run_folder(folder) as path:
         open_folder(path, work)

@@ -40,7 +40,7 @@ class SearchSettings(Record):
         "cmaes",
         ALGORITHMS,
         source=S6,
-        meaning="CMA-ES; a binary genetic algorithm; NSGA-II (Pareto fronts)",
+        meaning="optimiser: cmaes (CMA-ES), ga (a binary genetic algorithm) or nsga2 (NSGA-II, Pareto fronts)",
     )
     population: float = quantity(100, "1", low=2, high=1e6, source=S6, meaning="candidates per generation")
     generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations per run")
@@ -68,13 +68,13 @@ class SearchSettings(Record):
         "whole",
         ("whole", "growing"),
         source="our choice: most of what a search flies first does not flock at all",
-        meaning="length of the search's flights: that of the scenario, or from an eighth of it up to it",
+        meaning="length of the search's flights: whole, that of the scenario; growing, from an eighth of it up to it",
     )
     start: str = choice(
         "middle",
         ("middle", "scenario"),
         source="Methods, last paragraph of 'Fitness function': the middle",
-        meaning="where CMA-ES starts: in the middle of all ranges, or at the scenario's own numbers (warm)",
+        meaning="where CMA-ES starts: in the middle of all ranges, or at the numbers of the scenario (warm)",
     )
     spread: float = quantity(
         1.0 / 6.0,

@@ -15,9 +15,18 @@ from scipy import stats
 from airflock.core import Quantity, declarations
 from airflock.runs import FlightStore, parse_values, to_toml_values
 from airflock.scenarios import Scenario, format_number, formats, html_table
+from airflock.search.limit_excess import limit_report_line
 from airflock.search.optimisers import pareto_front
 from airflock.search.study import Study
-from airflock.support import FormatError, StudyError, as_error, atomic, parse_json
+from airflock.support import (
+    FormatError,
+    StudyError,
+    as_error,
+    atomic,
+    parse_json,
+    result_group,
+    result_table,
+)
 
 BEST_FILE = "best.toml"
 
@@ -66,6 +75,23 @@ class EvolveResult:
     def _repr_html_(self) -> str:
         """A table of the winner's parameters, for a notebook."""
         return result_html(self)
+
+    def __rich__(self) -> Any:
+        """Return the winner's parameters and what its flights say, for a terminal."""
+        rows = [
+            (key, f"{value:.4g}", " … ".join(f"{end:.3g}" for end in self.ranges.get(key, ())))
+            for key, value in self.parameters.items()
+        ]
+        title = f"{self.scenario.name}: {self.fitness:.4f} ± {self.sd:.2g} on {self.seeds} fresh seeds"
+        return result_group(
+            result_table(title, "*parameter; >best; >working range", rows),
+            f"95 % interval {self.low:.4f} … {self.high:.4f}; luckiest of the search {self.largest:.4f}; "
+            f"{self.above} of {self.candidate_count} candidates reach the mean; {self.failed} failed",
+            *(f"failed flights: {count}; {reason}" for reason, count in self.reasons.items()),
+            *map(limit_report_line, self.limits),
+            *(f"in {name}: {mean:.4f} ({low:.4f} … {high:.4f})" for name, (mean, low, high) in self.scenarios.items()),
+            None if self.dead_reason else f"fly it: airflock run {self.folder / BEST_FILE}",
+        )
 
     def document(self) -> dict[str, Any]:
         """The result as plain values, for result.toml and --json.

@@ -45,7 +45,7 @@ from airflock.runs import (
 from airflock.scenarios import Scenario, build_scenario, formats, load, rebuilt, scenario_variant, starting_set
 from airflock.search.evolution import run_study, study_executor
 from airflock.search.hardening import MAX_ROUNDS, StepResult, harden, hardened_document
-from airflock.search.limit_excess import flights_per_event
+from airflock.search.limit_excess import flights_per_event, limit_report_line
 from airflock.search.study import make_study
 from airflock.search.study_result import BEST_FILE, EvolveResult
 from airflock.search.study_space import default_space
@@ -59,6 +59,7 @@ from airflock.support import (
     expand_path,
     parse_json_object,
     read_text,
+    result_group,
     value_or_default,
 )
 
@@ -179,6 +180,17 @@ class TuneResult:
         """Which file to fly, what its certificate says of the limits, and its keys, for a notebook."""
         head = f"<p><b>{escape(str(self.folder / TUNED_FILE))}</b>, in {self.seconds:.0f} s</p>"
         return head + self.certificate._repr_html_() + self.scenario._repr_html_()
+
+    def __rich__(self) -> Any:
+        """Return what each stage found and where it is, for a terminal."""
+        r = self.result
+        return result_group(
+            f"evolved: fitness {r.fitness:.4f} ({r.low:.4f} to {r.high:.4f}) on {r.seeds} fresh seeds",
+            *(f"evolved: {limit_report_line(entry)}" for entry in r.limits),
+            f"hardened: {self.steps[-1].verdict}" if self.steps else f"not hardened: {self.why}",
+            *self.certificate.statements,
+            f"saved {self.folder}: tuned.toml, certificate.toml, report.html, figures.pdf",
+        )
 
     def document(self) -> dict[str, Any]:
         """Return the result as plain values, for --json."""
@@ -455,22 +467,22 @@ def tune(
 
     Parameters
     ----------
-    scenario : Scenario, str or path, a list of paths, or None
+    scenario : Scenario, str or path, a list of paths, or None (FILE|PRESET|LOGS...)
         Your drones, field and speed; numbers of the law that it does not give are scaled to its speed. With `like`, log
         files of your drones, as `airflock.identify` reads them. None continues what the folder holds.
-    out : str or path
+    out : str or path (DIR)
         Folder of everything: start, study, hardening, certificate, report, and tuned.toml to fly.
     budget : float
-        Time to spend, s.
+        Time to spend, s; for a command also 20min or 2h.
     limit : sequence of str
         What is to be shown, as `airflock.certify` takes it; by default that collisions (`metrics.r_coll`) are rarer
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
     confidence : float, optional
         Confidence of the certificate, a share in [0.5, 1); by default 0.95.
-    like : Scenario, str or path, optional
+    like : Scenario, str or path (PRESET|FILE), optional
         The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
-    heard : str or path, optional
+    heard : str or path (FILE.csv), optional
         Table of packets of these logs, as `airflock identify --heard` takes it.
     warm : bool
         Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.

@@ -32,26 +32,43 @@ def watch(
     radios hear: where the drones are, their phases, links and faults. It listens only, and can do
     nothing to them.
 
-    scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again; or of a flight card
-    settings : keys like "model.p_rep" with the values that replace the file's
-    seed     : seed of the flight
-    law      : a law of your own that flies instead of the file's, as for `airflock.load`
-    trust    : whether code that the file names, such as a law in a Python file, may run
-    host     : address to listen at; 0.0.0.0 lets other machines in
-    port     : port to listen at; 0 takes any free one
-    against  : what flies beside it on the same clock, with the same seed and noise: another preset or file, or keys
-               with values, such as {"model.p_rep": 0.2}
-    radios   : of a fleet: where its packets are heard, such as "udp:0.0.0.0:14600" or "serial:/dev/ttyUSB0:57600";
-               by default where a fleet in software is heard, udp:127.0.0.1:14600
-    key      : of a fleet: file of the mission's key; by default beside the card
-    say      : called with each line: notes, the address of the page, faults
-
-    Raises ScenarioError for a scenario that cannot be flown, CardError for card, key and radios of
-    a fleet, and StudioError for a port in use, one line each.
+    Parameters
+    ----------
+    scenario : str or path (PRESET|FILE)
+        A preset, a scenario file, a recording (.nc) to fly again, or the flight card (.json) of a fleet.
+    settings : mapping, optional
+        Keys like "model.p_rep" with the values that replace the file's.
+    seed : int in [0, inf]
+        Seed of the flight.
+    law : optional
+        A law of your own that flies instead of the file's, as for `airflock.load`.
+    trust : bool
+        Whether code that the file names, such as a law in a Python file, may run.
+    host : str
+        Address to listen at; 0.0.0.0 lets other machines in.
+    port : int in [0, 65535]
+        Port to listen at; 0 picks a free one.
+    against : str, path or mapping (PRESET|FILE|KEY=VALUE), optional
+        Fly this beside it on the same clock, with the same seed and noise: another preset or file, or keys with
+        values, such as {"model.p_rep": 0.2}, for a command one KEY=VALUE each.
+    radios : sequence of str (PORT)
+        For a fleet: where to receive its packets, such as "udp:0.0.0.0:14600" or "serial:/dev/ttyUSB0:57600"; by
+        default udp:127.0.0.1:14600, as a fleet in software uses.
+    key : str or path (FILE), optional
+        For a fleet: file of the mission's key; by default beside the card.
+    say : callable
+        Called with each line: notes, the address of the page, errors.
 
     Returns
     -------
-    Nothing, when the page is ended with Ctrl-C; what was found is saved from the page.
+    None
+        When the page is ended with Ctrl-C; what was found is saved from the page.
+
+    Raises
+    ------
+    AirflockError
+        ScenarioError for a scenario that cannot be flown, CardError for card, key and radios of a fleet, and
+        StudioError for a port in use, one line each.
 
     Examples
     --------

@@ -75,6 +75,12 @@ from .machine import (
     vector_bits as vector_bits,
 )
 from .many_tests import holm_correction as holm_correction
+from .rendering import (
+    format_cell as format_cell,
+    interval_lines as interval_lines,
+    result_group as result_group,
+    result_table as result_table,
+)
 from .threads import (
     available_cores as available_cores,
     check_interrupted as check_interrupted,

@@ -100,7 +100,7 @@ def shrink(base: Path, max_bytes: int = MOST) -> int:
 
 
 def clear_cache() -> tuple[int, int]:
-    """Remove all drivers; return how many there were, and their bytes. Studies behind papers stay."""
+    """Remove all compiled drivers. Return how many there were, and their bytes; studies behind papers stay."""
     known = list_drivers(default_cache_folder())
     for _, _, folder in known:
         shutil.rmtree(folder, ignore_errors=True)

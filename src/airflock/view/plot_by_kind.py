@@ -41,17 +41,19 @@ def plot(
 
     Parameters
     ----------
-    source : Scenario, xarray.Dataset, str or path
-        A scenario or the name of one, which is flown; or a recording (time, space, keypoint, individual), or a
-        file (.nc) of one.
-    kind : str
+    source : Scenario, xarray.Dataset, str or path (PRESET|FILE)
+        A scenario or the name or file of one, which is flown; or a recording (time, space, keypoint, individual),
+        or a file (.nc) of one.
+    kind : {"trajectories", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception"}
         trajectories, series, flocked; scene, space, rays where something stands in the world; wash of a
         formation of wings; reception, the time since the last packet by distance; rules of a model;
         transfer, the partial fitnesses.
-    seed : int
+    seed : int in [0, inf]
         Seed of the flight, if a scenario is flown.
-    start, stop : float, optional
-        Window of time, s; which one is shown otherwise stands in the picture's title.
+    start : float, optional
+        First instant shown, s; by default see the picture's title.
+    stop : float, optional
+        Last instant shown, s; by default the end.
     settings : mapping, optional
         Keys of the scenario to change, such as {"radio.delay": 0.5}; a recording takes none.
     law : optional

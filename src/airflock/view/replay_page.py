@@ -409,21 +409,29 @@ class Replay:
 def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "speed") -> Replay:
     """Build a page that plays a recording; it opens from disk without network and displays itself in a notebook.
 
-    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
-    rate      : frames per second that are kept at most
-    colour    : what the colours stand for when it opens, as the page's menu names it: speed, heading, height, agent,
-                cluster, group, fault, a number that differs among agents, or a variable of the recording with one
-                number for each individual (at each time, or for good)
-
     Individuals that are absent are not drawn.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        (time, space, keypoint, individual), simulated or flown: position m, velocity m/s.
+    rate : float in [0.1, 100]
+        Most frames kept per second.
+    colour : str (NAME)
+        Colour when it opens, as the page's menu names it: speed, heading, height, agent, cluster, group, fault, a
+        number that differs among agents, or a variable of the recording with one number for each individual (at each
+        time, or for good).
 
     Returns
     -------
-    The page: `save(path)` writes it as one HTML file, `text` holds it, and a notebook shows it.
+    Replay
+        The page: `save(path)` writes it as one HTML file, `text` holds it, and a notebook shows it.
 
-    Raises RecordingError for a colour that the recording does not know, and for a rate that is
-    none; ScenarioError and FlightError where the scenario that it carries cannot be read or flown
-    again.
+    Raises
+    ------
+    AirflockError
+        RecordingError for a colour that the recording does not know, and for a rate that is none; ScenarioError and
+        FlightError where the scenario that it carries cannot be read or flown again.
 
     Examples
     --------

@@ -281,20 +281,22 @@ def video(
         (time, space, keypoint, individual), simulated or flown: position m, velocity m/s.
     path : str or path
         Ends in .mp4 or .gif.
-    fps : float
+    fps : float in [1, 120]
         Pictures per second; `frame_count` says how many there will be.
-    speed : float
-        Times real time.
-    start, stop : float, optional
-        Window of time, s; by default all of it.
+    speed : float in [0.01, 1000]
+        Speed of the picture, times real time.
+    start : float, optional
+        First instant shown, s; by default the first.
+    stop : float, optional
+        Last instant shown, s; by default the end.
     tail : float
         Flight behind each agent that is drawn, s; 0 draws none.
     height : int
-        Of the picture, pixels; its width follows from the arena; both are made even.
+        Height of the picture, pixels; its width follows from the arena; both are made even.
     space : bool, optional
-        Seen obliquely, or from above. By default as it was flown.
-    chart : str
-        Name of an order parameter that is drawn over time beside the picture.
+        View at an angle, or from above; by default as it was flown.
+    chart : str (NAME)
+        Show this order parameter over time beside the picture.
     done : callable, optional
         Called after each picture.
 

@@ -95,8 +95,18 @@ def check_against_logs(
 ) -> LogCheck:
     """Fly a scenario with as many agents and as long as the log, with the log's absences, and compare.
 
-    flights : how many; done : called after each
-    comparable : whether the drones' clocks agree; else only speeds are compared
+    Parameters
+    ----------
+    scenario : Scenario
+        What flies.
+    logs : FlightLogs
+        What it is compared with.
+    flights : int in [0, inf]
+        Flights to compare with the log; 0: none.
+    on_done : callable, optional
+        Called after each.
+    comparable : bool
+        True if the drones' clocks agree; else only speeds are compared.
     """
     times, place, speed = frames_of_logs(logs)
     keep = times <= LONGEST

@@ -22,7 +22,15 @@ from airflock.parts.radios import ENTRIES
 from airflock.parts.sensors import langevin
 from airflock.recordings import ImportOptions, ImportReport, read_tracks, refuse_archive
 from airflock.scenarios import Scenario, build_scenario, load_if_named
-from airflock.support import AirflockError, RecordingError, expand_path, is_file
+from airflock.support import (
+    AirflockError,
+    RecordingError,
+    expand_path,
+    format_cell,
+    is_file,
+    result_group,
+    result_table,
+)
 
 # key → whether a larger number makes a flight harder
 HARDER = {
@@ -142,13 +150,54 @@ class IdentifyResult:
         document = {key: value for key, value in self.like.document.items() if key != "published"}
         return build_scenario(document, self.like.name, self.settings(level))
 
-    def document(self, level: float | None = None, *, uncertain: bool = False) -> dict[str, Any]:
-        """Return a scenario file's content: each number with unit and source, on request with its interval."""
+    def reasons(self) -> list[str]:
+        """Return why numbers cannot be identified, a line for each reason."""
+        keys: dict[str, list[str]] = {}
+        for key, number in self.numbers.items():
+            if not number.told:
+                keys.setdefault(number.reason, []).append(key)
+        return [f"{', '.join(own)}: {reason}" for reason, own in keys.items()]
+
+    def __rich__(self) -> Any:
+        """Return the identified numbers, and why the others are not, for a terminal."""
+        rows = [
+            (
+                key,
+                format_cell(number.value),
+                f"{number.low:.3g} to {number.high:.3g}",
+                "" if KEY_UNITS[key] == "1" else KEY_UNITS[key],
+                "" if number.like is None else format_cell(number.like),
+                number.origin,
+            )
+            for key, number in self.numbers.items()
+            if number.told
+        ]
+        title = f"{self.logs.drones} drones, like {self.like.name}"
+        noise = f"noise of logged velocities {self.log_noise:.3g} m/s per axis" if self.log_noise is not None else None
+        none = f"{self.logs.drones} drones: no number can be identified from these logs; all are kept from --like:"
+        return result_group(
+            result_table(title, "|number; |>value; |>95 %; |>unit; |>like; from", rows) if rows else None,
+            noise if rows else None,
+            "not identified, kept from --like:" if rows else none,
+            *(f"  {line}" for line in self.reasons()),
+            *(f"  {key}: {reason}" for key, reason in UNIDENTIFIABLE.items()),
+        )
+
+    def document(self, conservative: float | None = None, *, uncertain: bool = False) -> dict[str, Any]:
+        """Return a scenario file's content: each number with unit and source, on request with its interval.
+
+        Parameters
+        ----------
+        conservative : float, optional
+            Write the pessimistic end of each interval of this level, such as 0.95, instead of the number.
+        uncertain : bool
+            Also write the intervals into the scenario.
+        """
         document = _copied(self.like.document)
         document.pop("published", None)
         document["title"] = f"{self.like.name} with the numbers of {len(self.sources) or self.logs.drones} logs"
         today = datetime.date.today().isoformat()
-        for key, value in self.settings(level).items():
+        for key, value in self.settings(conservative).items():
             section, _, name = key.partition(".")
             number = self.numbers[key]
             half = 0.5 * (number.high - number.low)
@@ -156,7 +205,7 @@ class IdentifyResult:
             entry: dict[str, Any] = {"value": _short(value)}
             if KEY_UNITS[key] != "1":
                 entry["unit"] = KEY_UNITS[key]
-            entry["source"] = how + (f"; pessimistic end at {level:g}" if level is not None else "")
+            entry["source"] = how + (f"; pessimistic end at {conservative:g}" if conservative is not None else "")
             if uncertain:
                 entry["interval"] = [_short(max(number.low, 0.0)), _short(number.high)]
             document.setdefault(section, {})[name] = entry
@@ -179,24 +228,26 @@ def identify(
 
     Parameters
     ----------
-    flight_logs : path, list of paths, xarray.Dataset or FlightLogs
+    flight_logs : path, list of paths, xarray.Dataset or FlightLogs (FILE...)
         Files (as in `load_tracks`), a recording, or logs.
-    like : Scenario or str
+    like : Scenario or str (PRESET|FILE)
         Scenario or preset that is flown by the same law; what is not identified stays as it is there.
-    heard : pandas.DataFrame, optional
+    heard : pandas.DataFrame (FILE.csv), optional
         Packets: receiver, sender, t (receiver's clock, s), stamp (sender's clock, s), and for reception distance (m)
         and got (0 or 1; one row per decision and pair), or seq, the number that the sender gave each packet: then
         gaps of seq are losses, and distances come from the positions of the logs.
-    standing : tuple of float, optional
+    standing : tuple of float (BEGIN:END), optional
         First and last time on the ground, s after each log begins, unless the logs tell it.
     same_clock : bool
         The clocks of all files agree.
     options : ImportOptions, optional
         How files are read (`airflock.recordings.imports.track.ImportOptions`), as in `load_tracks`.
-    accept : iterable of str
+    accept : iterable of str (KIND)
         Kinds of errors that are intended, as in `load_tracks`.
-    begin, end : float, optional
-        Window of time of the files that is used, s.
+    begin : float, optional
+        First instant of the files that is used, s.
+    end : float, optional
+        Last instant of the files that is used, s.
 
     Returns
     -------
@@ -380,7 +431,7 @@ class Flight(NamedTuple):
 
 
 def flight_card(like: Scenario) -> list[Flight]:
-    """Return the parts of the card, sized by the numbers of a scenario that is thought to be near."""
+    """List the test flights that make every number identifiable, sized by a scenario that is thought to be near."""
     tau, a_max = like.body.tau, like.body.a_max
     step = 3.0 * tau * a_max  # a step of this size is at the limit for two thirds of its way
     hold = max(4.0 * tau + step / a_max, 2.0)

@@ -33,7 +33,7 @@ from airflock.estimate.inference.observed_tracks import (
 from airflock.estimate.inference.parametric_bootstrap import CorrectedFit, FitNoise, correct_fit
 from airflock.recordings import load_recording, load_tracks
 from airflock.scenarios import CallerParts, Scenario, build_scenario
-from airflock.support import AirflockError, RecordingError, expand_path
+from airflock.support import AirflockError, RecordingError, expand_path, interval_lines, result_group, result_table
 from airflock.world import half_sizes
 
 Array = NDArray[np.float64]
@@ -185,6 +185,43 @@ class InferResult:
     check: PredictiveCheck | None = None
     settings: Mapping[str, float] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
+
+    def __rich__(self) -> Any:
+        """Return the laws, and the numbers and the check of the best one, for a terminal."""
+        rows = [
+            (
+                law.name, f"{law.gain:.0f} ± {law.error:.0f}", f"{law.ahead:.0%}", f"{law.aic_difference:.0f}",
+                f"{law.inside:.1%}", f"{law.missed:.1%}", str(len(law.numbers)),
+            )
+            for law in self.laws
+        ]  # fmt: skip
+        fitted, every = self.fitted
+        title = f"{self.individual_count} individuals, {self.steps} steps; fitted on {fitted} of {every} frames"
+        heads = "law; >gain; >ahead; >AIC; >in 95 %; >left over; >numbers"
+        return result_group(
+            result_table(title, heads, rows, no_wrap=True),
+            "compared with going straight on: gain in log-likelihood of held-out steps; AIC of the fit, negative is "
+            "better",
+            self.verdict,
+            *(self._best_parts(self.best) if self.best is not None else ()),
+        )
+
+    def _best_parts(self, best: LawResult) -> list[Any]:
+        """Return a table of the numbers of the best law, the noise, and the check against the tracks."""
+        rows = [
+            (
+                key, f"{number.value:.4g}", "" if number.unit == "1" else number.unit,
+                ends_text(number.low, number.high), ends_text(number.least, number.most),
+            )
+            for key, number in best.numbers.items()
+        ]  # fmt: skip
+        heads = "number; >value; unit; 95 % for it alone; 95 % for all together"
+        parts: list[Any] = [result_table(f"numbers of {best.name}", heads, rows, no_wrap=True)]
+        parts += [f"noise of the tracks {self.noise.seen:.3g} m"] if self.noise is not None else []
+        if self.check is not None:
+            parts.append("check: flocks of this law, flown freely from the first frame, against the tracks")
+            parts += interval_lines(self.check.found)
+        return parts
 
     def document(self) -> dict[str, Any]:
         """Return a scenario file's content: the best law with its numbers; raise AirflockError where there is none."""
@@ -355,7 +392,7 @@ def infer(
     models: Sequence[str | Scenario] = LAWS,
     *,
     settings: Mapping[str, Any] | None = None,
-    topologies: Sequence[str] = (METRIC,),
+    topologies: Sequence[str] = ("metric",),
     check: int = 20,
     seed: int = 0,
     trust: bool = False,
@@ -365,18 +402,18 @@ def infer(
 
     Parameters
     ----------
-    tracks : xarray.Dataset, path, or several of them
+    tracks : xarray.Dataset, path, or several of them (TRACKS...)
         Recordings of individuals that fly or swim together: several are held out in turn.
-    models : sequence of str or Scenario
+    models : sequence of str or Scenario (LAW,FILE,...)
         Laws by name, presets, scenario files or files with a law of your own.
     settings : mapping, optional
         Keys that hold for every candidate, such as {"world.arena": "square", "world.side": 40.0}.
-    topologies : sequence of str
+    topologies : sequence of str (KIND,...)
         Neighbourhoods by which every law is tried: metric, as the law itself has it; nearest, the k nearest, k fitted;
         voronoi, whose cells border its own.
-    check : int
+    check : int in [0, inf]
         Flights of the law found that are compared with the tracks; 0: none.
-    seed : int
+    seed : int in [0, inf]
         Seed of the search for the best fit.
     trust : bool
         Whether laws in files may run.

@@ -67,40 +67,44 @@ def load_tracks(
 
     Parameters
     ----------
-    source : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
+    source : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array (FILE...)
         A file or several of the formats that airflock import --help lists, a table, such as
         {"t": [...], "id": [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
-    map : mapping, optional
-        Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z
-        (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m), utc (s since 1970),
-        air (1 in flight), id and receiver (of which one is read). Headers with units need none: `x [mm]`, `time_us`.
-        Of files of several arrays `position` is the name of one.
-    unit : str
-        Of lengths that bring none: m, cm, mm, km, ft or px.
+    map : mapping (TARGET:=COLUMNS), optional
+        Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}, for a command
+        t:=time_us*1e-6, repeatable; targets are t, x, y, z (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s),
+        lat, lon (degrees), alt (m), utc (s since 1970), air (1 in flight), id and receiver (of which one is read).
+        Headers with units need none: `x [mm]`, `time_us`. Of files of several arrays `position` is the name of one.
+    unit : str (UNIT)
+        Unit of lengths that have none: m, cm, mm, km, ft or px.
     scale : float, optional
         Metres per pixel, with px.
-    time_unit : str
-        Of times that bring none: s, ms, us, ns, min or frames; of dates that leave it open: dmy or mdy.
+    time_unit : str (UNIT)
+        Unit of times that have none: s, ms, us, ns, min or frames; of dates that leave it open: dmy or mdy.
     fps : float, optional
         Frames per second, with frames.
     keypoint : str
-        Which one, where there are several.
+        Keypoint to use, where there are several.
     axes : str
         enu, or ned where x is north and z down; by default enu, but ned of a table with the fields of PX4.
-    origin : tuple of float, optional
+    origin : tuple of float (LAT,LON[,HEIGHT]), optional
         Latitude, longitude (degrees) and height (m) of the local frame; by default the first fix.
     rate : float, optional
         Frames per second of the recording; by default the tracks' own.
     bridge : float
         Longest gap that is bridged, s (confidence 0.5); where a gap is longer, an individual is absent (nan).
-    begin, end : float, optional
-        Window of time, s.
+    begin : float, optional
+        First instant to keep, s.
+    end : float, optional
+        Last instant to keep, s.
     same_clock : bool
         The clocks of several files agree.
-    accept : str or iterable of str
+    accept : iterable of str (KIND)
         Kinds of errors that are intended: absent, axes, down, duplicates, height, jumps, rows, time.
-    decimal, delimiter : str
-        Of a text file: its decimal point, and what stands between columns, which is found out by default.
+    decimal : str
+        Decimal point of a text file: . or ,
+    delimiter : str
+        Separator between columns of a text file; by default detected.
     precision : int
         Bits per number, 32 or 64; far from the origin, where 32 do not tell a centimetre, 64.
     say, done : callable, optional
