@@ -244,6 +244,8 @@ def test_a_sweep_in_a_folder_is_the_sweep_and_goes_on_from_the_folder_alone(tmp_
         airflock.sweep(short, over, seeds=[3, 6], out=tmp_path / "a", resume=True)
     with pytest.raises(airflock.AirflockError, match="^over: .* holds this itself"):
         airflock.sweep(over=over, out=tmp_path / "a", resume=True)
+    with pytest.raises(airflock.AirflockError, match="give keys with lists of values"):
+        airflock.sweep(short)
     with pytest.raises(airflock.AirflockError, match="a folder keeps seeds below 2.63"):
         airflock.sweep(short, over, seeds=[1 << 63], out=tmp_path / "b")
     monkeypatch.setattr("airflock.runs.executors.ScenarioTask.score", lambda *_: pytest.fail("flown"))

@@ -185,7 +185,7 @@ def resumed_sweep(folder: str | os.PathLike[str] | None, *, trust: bool = False,
 
 def grid_points(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     """Return all combinations of the values of several keys; raise ScenarioError for keys without a list of values."""
-    if not isinstance(over, Mapping):
+    if not isinstance(over, Mapping) or not over:
         raise ScenarioError([f"over = {over!r}: give keys with lists of values, such as {{'radio.delay': [0.0, 1.0]}}"])
     lacking = [key for key, values in over.items() if isinstance(values, str) or not isinstance(values, Iterable)]
     if lacking:
