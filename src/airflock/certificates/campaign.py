@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,9 +22,11 @@ from airflock.runs import (
     check_worker_device,
     declared_numbers,
     fingerprint,
+    requested_scenario,
+    unpublished,
     with_parameters,
 )
-from airflock.scenarios import FaultTiming, Scenario, build_scenario
+from airflock.scenarios import FaultTiming, Scenario
 from airflock.support import ErrorCollector, ScenarioError, StudyError, as_error, check_precision, suggest
 
 LAYOUT = 1  # of the folder; raised whenever an older folder could not be continued
@@ -115,7 +116,7 @@ class Campaign:
             "limits": [limit.text for limit in self.limits],
             "flights": self.flights,
             "uncertain": self.flies_intervals,
-            "scenario": {key: value for key, value in self.scenario.document.items() if key != "published"},
+            "scenario": unpublished(self.scenario),
         }
 
 
@@ -159,7 +160,7 @@ def campaign_of_request(held: Mapping[str, Any], *, trust: bool = False) -> Camp
     """Return the campaign that a folder holds. Raises ScenarioError or StudyError where that cannot be flown here."""
     with as_error(REQUEST_FILE, StudyError):
         name, flights = str(held["name"]), held.get("flights")
-        scenario = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
+        scenario = requested_scenario(held["scenario"], name, trust=trust)
         texts, bits, device = list(held["limits"]), int(held["precision"]), str(held["device"])
         campaign = campaign_from_request(
             scenario, texts, held["confidence"], flights, uncertain=held["uncertain"], precision=bits, device=device

@@ -24,9 +24,11 @@ from airflock.runs import (
     make_executor,
     open_folder,
     open_run,
+    requested_scenario,
     score_scenarios,
+    unpublished,
 )
-from airflock.scenarios import Scenario, build_scenario, check_seeds, scenario_variant, short_keys
+from airflock.scenarios import Scenario, check_seeds, scenario_variant, short_keys
 from airflock.support import (
     ScenarioError,
     StudyError,
@@ -151,7 +153,7 @@ class Sweep:
             "name": self.scenario.name,
             "seeds": list(self.seeds),
             "over": {key: list(values) for key, values in self.over.items()},
-            "scenario": {key: value for key, value in self.scenario.document.items() if key != "published"},
+            "scenario": unpublished(self.scenario),
         }
 
 
@@ -178,7 +180,7 @@ def resumed_sweep(folder: str | os.PathLike[str] | None, *, trust: bool = False,
     held = held_request(folder, Sweep.kind, given)
     with as_error(folder or "", StudyError):
         name, seeds = str(held["name"]), check_seeds(held["seeds"])
-        base = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
+        base = requested_scenario(held["scenario"], name, trust=trust)
         bits, device = held["precision"], held["device"]
         return make_sweep(base, held["over"], seeds, precision=bits, device=device, trust=trust)
 

@@ -33,9 +33,11 @@ from .folder import (
     program_versions as program_versions,
     read_request as read_request,
     read_toml_file as read_toml_file,
+    requested_scenario as requested_scenario,
     run_folder as run_folder,
     run_place as run_place,
     to_toml_values as to_toml_values,
+    unpublished as unpublished,
     write_toml_file as write_toml_file,
 )
 from .search_space import (

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 from airflock import __version__
 from airflock.runs.executors import Executor
 from airflock.runs.flight_store import FlightStore
-from airflock.scenarios import Scenario
+from airflock.scenarios import Scenario, build_scenario
 from airflock.support import StudyError, as_error, atomic, expand_path, processor_name, read_toml
 
 REQUEST_FILE, RESULT_FILE = "request.toml", "result.toml"
@@ -47,6 +47,16 @@ class Work(Protocol):
 
     def document(self) -> dict[str, Any]:
         """Return everything that decides its result, as plain values."""
+
+
+def unpublished(scenario: Scenario) -> dict[str, Any]:
+    """Return what a request holds of a scenario: its document without the published values of a paper."""
+    return {key: value for key, value in scenario.document.items() if key != "published"}
+
+
+def requested_scenario(document: Mapping[str, Any], name: str, *, trust: bool) -> Scenario:
+    """Return the scenario of a request; files that it names lie beside the file `name`."""
+    return build_scenario(document, name, folder=Path(name).parent, trust=trust)
 
 
 def read_request(folder: Path, kind: str, *, resume: bool | None = None) -> dict[str, Any] | None:

@@ -35,6 +35,7 @@ from airflock.runs import (
     open_run,
     run_folder,
     to_toml_values,
+    unpublished,
 )
 from airflock.scenarios import Scenario, check_seeds, formats, load_if_named, rebuilt
 from airflock.search.generations import ZERO_FITNESS, zero_fitness_reason
@@ -340,7 +341,6 @@ class Hardening:
 
     def document(self) -> dict[str, Any]:
         """Return the hardening as plain values: the request in its folder."""
-        scenarios = [{k: v for k, v in each.document.items() if k != "published"} for each in self.scenarios]
         return {
             "airflock": __version__,
             "rules": " ".join(fingerprint(each, 32) for each in self.scenarios),
@@ -349,7 +349,7 @@ class Hardening:
             "cost": self.constraints.cost,
             "limits": [limit.text for limit in self.constraints.limits],
             "steps": [{"name": s.name, "factors": dict(s.factors), "braking_lead": s.braking_lead} for s in self.steps],
-            **{f"scenario_{i}": document for i, document in enumerate(scenarios, 1)},
+            **{f"scenario_{i}": unpublished(each) for i, each in enumerate(self.scenarios, 1)},
         }
 
 

@@ -11,10 +11,9 @@ from typing import Any
 
 from airflock import __version__
 from airflock.certificates import EventLimit
-from airflock.runs import SearchSpace, declared_numbers, fingerprint
+from airflock.runs import SearchSpace, declared_numbers, fingerprint, requested_scenario, unpublished
 from airflock.scenarios import (
     Scenario,
-    build_scenario,
     files_of_laws,
     formats,
     html_table,
@@ -121,7 +120,7 @@ class Study:
             ],
             **({"limits": [limit.text for limit in self.limits]} if self.limits else {}),
             "space": self.space.document(),
-            "scenario": _unpublished(self.scenario),
+            "scenario": unpublished(self.scenario),
             **self._several(),
         }
 
@@ -141,12 +140,8 @@ class Study:
         """Return the entries of several scenarios for the document."""
         if not self.others:
             return {}
-        found = {f"scenario_{i}": _unpublished(scenario) for i, scenario in enumerate(self.others, 2)}
+        found = {f"scenario_{i}": unpublished(scenario) for i, scenario in enumerate(self.others, 2)}
         return {"over_scenarios": self.over_scenarios, "labels": list(self.labels), **found}
-
-
-def _unpublished(scenario: Scenario) -> dict[str, Any]:
-    return {key: value for key, value in scenario.document.items() if key != "published"}
 
 
 def shipped_studies() -> dict[str, Path]:
@@ -219,7 +214,7 @@ def study_of_request(
     if names[0] != held["name"] or len(names) != len(documents):
         raise StudyError(f"a study of {held['name']} and {len(documents) - 1} more, not of {', '.join(names)}")
     scenarios = [
-        scenario_variant(build_scenario(document, name, folder=Path(name).parent, trust=trust), settings, trust=trust)
+        scenario_variant(requested_scenario(document, name, trust=trust), settings, trust=trust)
         for name, document in zip(names, documents, strict=True)
     ]
     goals = held["objective"]

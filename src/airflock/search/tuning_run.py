@@ -39,7 +39,9 @@ from airflock.runs import (
     held_request,
     open_folder,
     read_request,
+    requested_scenario,
     run_place,
+    unpublished,
     write_toml_file,
 )
 from airflock.scenarios import Scenario, build_scenario, formats, load, rebuilt, scenario_variant, starting_set
@@ -141,8 +143,8 @@ class Tuning:
 
     def document(self) -> dict[str, Any]:
         """Return the tuning as plain values: the request in its folder."""
-        scenario = {key: value for key, value in self.start.document.items() if key != "published"}
-        of = {"identity": scenario_identity(self.start), "name": self.start.name, "scenario": scenario}
+        start = self.start
+        of = {"identity": scenario_identity(start), "name": start.name, "scenario": unpublished(start)}
         return {**self.plan.document(), **of}
 
 
@@ -238,7 +240,7 @@ def read_plan(held: Mapping[str, Any], where: object) -> BudgetPlan:
 
 def scenario_text_document(scenario: Scenario) -> dict[str, Any]:
     """Return the document of a scenario file without published values of a paper."""
-    return {formats.KEY: formats.FORMAT, **{k: v for k, v in scenario.document.items() if k != "published"}}
+    return {formats.KEY: formats.FORMAT, **unpublished(scenario)}
 
 
 PILOT = 4  # flights per core by which the time of one flight is measured
@@ -308,10 +310,9 @@ def read_report(folder: Path) -> dict[str, Any]:
 def _identify_request(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
     """Return everything that decides the outcome, as plain values."""
     files = [*logs, *([] if heard is None else [heard])]
-    like_document = {key: value for key, value in like.document.items() if key != "published"}
     return {
         "logs": {Path(path).name: _hash(path) for path in files},
-        "like": hashlib.sha256(json.dumps(like_document, sort_keys=True, default=str).encode()).hexdigest()[:12],
+        "like": hashlib.sha256(json.dumps(unpublished(like), sort_keys=True, default=str).encode()).hexdigest()[:12],
     }
 
 
@@ -642,7 +643,7 @@ def _begun(
             if "scenario" not in held:
                 raise StudyError(f"{folder}: was begun by an older version; name its scenario again")
             name, notes = str(held["name"]), list(held.get("also", {}).get("notes", []))
-            start = build_scenario(held["scenario"], name, folder=Path(name).parent, trust=trust)
+            start = requested_scenario(held["scenario"], name, trust=trust)
         report = read_report(folder) if (folder / REPORT_FILE).is_file() else None
         if report is None and held.get("also", {}).get("logs"):  # killed before it was written
             raise StudyError(f"{folder}: holds nothing of its logs yet; name them again, with --like")
