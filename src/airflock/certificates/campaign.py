@@ -405,9 +405,11 @@ def scenario_identity(scenario: Scenario) -> str:
     if scenario.scene.up == "standard":  # which is z but in glTF, and what stands is in the hash
         document["scene"]["up"] = "z"
     document["world"] = {k: v for k, v in document["world"].items() if k not in ("latitude", "longitude")}
-    for section, key in (("start", "wall_clearance"), ("body", "delay")):
+    for section, key in (("start", "wall_clearance"), ("body", "delay"), ("scene", "spheres")):
         if not document[section][key]:  # as in flights from before there was one
             del document[section][key]
+    if not any(law.model.steer for law in scenario.laws):  # nothing reads them
+        document.pop("steer", None)
     document["laws"] = [scenario.model.name, scenario.body.rule.name]
     # The default is left out, so that certificates from before there were others stay what they are.
     if scenario.sensors.rule.name != SENSORS.default:
