@@ -37,7 +37,7 @@ from airflock.parts import FAULTS
 from airflock.studio.fleet_page import drone_html, faults_html, fleet_warning, members_html, notes_html
 from airflock.studio.live_page import open_card_and_radios
 from airflock.support.errors import AirflockError, CardError, StudioError
-from airflock.view.replay_page import card_scene
+from airflock.view.scene import card_scene
 from fleets import PRIVATE, card, fleet, scenario
 
 START = [State(20.0 * i, 0.0, 0.0, 2.0, 0.0, 0.0) for i in range(3)]

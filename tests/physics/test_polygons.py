@@ -10,7 +10,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from airflock.scenarios.flight_world import FlightWorld as Seen
 from airflock.support.errors import ScenarioError
-from airflock.view.replay_page import prism_solid as drawn_prism
+from airflock.view.scene import prism_solid as drawn_prism
 from airflock.world import arena, polygon
 from airflock.world.shapes import from_triangle
 from airflock.world.world_map import WorldMap, edge_rows

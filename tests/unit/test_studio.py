@@ -47,7 +47,7 @@ from airflock.studio.player import FlightRequest, KeptSnapshots, PageClock, Play
 from airflock.support.errors import ParameterError, RuleError, ScenarioError, StudioError
 from airflock.view import agent_colours
 from airflock.view.agent_colours import AgentColours, cluster_labels
-from airflock.view.replay_page import dart_mesh, scenario_geometry, velocity_quaternions
+from airflock.view.scene import dart_mesh, scenario_geometry, velocity_quaternions
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}

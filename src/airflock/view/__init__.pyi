@@ -26,21 +26,23 @@ from .plot_by_kind import (
     recording_or_flight as recording_or_flight,
 )
 from .replay_page import (
-    SceneGeometry as SceneGeometry,
-    SceneLines as SceneLines,
-    SceneSolid as SceneSolid,
-    card_scene as card_scene,
     check_colour as check_colour,
-    dart_mesh as dart_mesh,
     replay as replay,
-    scenario_geometry as scenario_geometry,
-    velocity_quaternions as velocity_quaternions,
 )
 from .result_plots import (
     plot_certificate as plot_certificate,
     plot_identified as plot_identified,
     plot_inferred as plot_inferred,
     stood as stood,
+)
+from .scene import (
+    SceneGeometry as SceneGeometry,
+    SceneLines as SceneLines,
+    SceneSolid as SceneSolid,
+    card_scene as card_scene,
+    dart_mesh as dart_mesh,
+    scenario_geometry as scenario_geometry,
+    velocity_quaternions as velocity_quaternions,
 )
 from .search_plots import (
     convergence as convergence,

@@ -10,8 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.recordings import DIMENSIONS, attributes, check_recording, differentiated_velocity, scenario_of_recording
-from airflock.scenarios import Scenario, ground_plan
+from airflock.scenarios import Scenario
 from airflock.support import RecordingError
+from airflock.view.scene import wall_lines
 from airflock.world import arena, half_sizes
 
 Array = NDArray[Any]
@@ -108,45 +109,6 @@ def title_details(recording: xr.Dataset, paths: FlightPaths | None = None) -> st
     if paths is not None:
         parts.append(f"{paths.times[0]:.4g} to {paths.times[-1]:.4g} s")
     return " · ".join(parts)
-
-
-class WorldOutline(NamedTuple):
-    """Corners (corner, axis) in m of a closed polygon; `obstacle` is false for the arena."""
-
-    corners: Array
-    obstacle: bool
-
-
-def _outline_heights(world: arena.Parameters) -> list[tuple[float, float]]:
-    """Return the lowest and the highest height of each outline of a 3-D arena, m."""
-    whole = arena.heights_of(world)
-    heights = [] if world.arena == "none" else [whole]
-    return heights + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
-
-
-def world_outlines(world: arena.Parameters) -> list[WorldOutline]:
-    """Return the ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons."""
-    plan = ground_plan(world)
-    outlines = [] if plan is None else [WorldOutline(np.array(plan.exterior.coords), False)]
-    for corners in world.obstacles:
-        outlines.append(WorldOutline(np.array([*corners, corners[0]]), True))
-    return outlines
-
-
-def wall_lines(world: arena.Parameters) -> list[WorldOutline]:
-    """Return faces and edges to draw: in the plane the outlines, in space floor, ceiling and uprights of each."""
-    if world.dimensions == "2":
-        return world_outlines(world)
-    outlines = []
-    for (corners, obstacle), (low, high) in zip(world_outlines(world), _outline_heights(world), strict=True):
-        outlines += [WorldOutline(_at_height(corners, z), obstacle) for z in (low, high)]
-        step = max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1  # a circle gets eight uprights
-        outlines += [WorldOutline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
-    return outlines
-
-
-def _at_height(corners: Array, z: float) -> Array:
-    return np.column_stack([corners, np.full(len(corners), z)])
 
 
 def crosses_periodic_face(segments: Array, world: arena.Parameters) -> Array:

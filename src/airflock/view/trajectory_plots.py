@@ -28,10 +28,10 @@ from airflock.view.flight_paths import (  # fmt: skip
     short_name,
     speed_range,
     title_details,
-    wall_lines,
     world_or_open,  # fmt: skip
 )
 from airflock.view.law_vectors import CastRay, rays_and_command
+from airflock.view.scene import wall_lines
 from airflock.world import BOX, CYLINDER, SEGMENT, SHAPES, SPHERE, TRIANGLE, arena
 
 SCENERY_MARGIN = 40.0  # m of scenery shown around the paths

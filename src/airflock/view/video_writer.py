@@ -31,9 +31,9 @@ from airflock.view.flight_paths import (  # fmt: skip
     speed_range,
     time_window,
     title_details,
-    wall_lines,
     world_or_open,
 )
+from airflock.view.scene import wall_lines
 from airflock.view.style import PictureError, atomic_picture, check_positive
 from airflock.view.trajectory_plots import (
     VIEW_ELEVATION_DEG,
