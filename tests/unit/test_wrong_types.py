@@ -1,5 +1,6 @@
 """What a caller gives by mistake ends in one line that names it and says what to give, whatever its type."""
 
+import itertools
 import json
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import pytest
 
 import airflock
 from airflock.recordings.imports.load_tracks import load_tracks
+from airflock.scenarios import events
 from airflock.scenarios.files import load
 
 PAPER = "vasarhelyi_2018/4ms"
@@ -73,6 +75,17 @@ def test_a_number_that_a_rule_does_not_have_is_told_by_its_check(name, kind, lin
     assert told(lambda: check(kind, {"sped": 1.0}))[0].startswith(line)
     assert "are no keys with values" in told(lambda: check(kind, [1.0]))[0]
     assert told(lambda: check(kind, seed="one")) == ["seed = 'one' is not a whole number in [0, 2^64 - 1]"]
+
+
+def test_flights_are_counted_before_they_are_listed(monkeypatch):
+    """Lists that never end filled the memory; a flock's agents were compared each with each."""
+    many, endless = range(10**11), itertools.count()
+    grid = "over: a grid of 10000200001 points or more, which is more than 100000"
+    assert told(lambda: airflock.sweep(PAPER, {"dt": many, "radio.delay": endless})) == [grid]
+    monkeypatch.setattr(events, "MAX_FLIGHTS", 1000)
+    for seeds in (many, endless):
+        assert told(lambda seeds=seeds: events.check_seeds(seeds)) == ["seeds: more than 1000 flights at a time"]
+    assert events.check_agents(range(200_000), 200_000)[-1] == 199_999
 
 
 def test_what_is_no_flight_and_what_are_no_events_is_told():

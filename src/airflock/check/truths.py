@@ -25,7 +25,7 @@ from airflock.core import (
 )
 from airflock.engine import DriverSource
 from airflock.scenarios import Scenario, schema, settings_dict
-from airflock.support import AirflockError, RuleError, ScenarioError
+from airflock.support import AirflockError, ErrorCollector, RuleError
 
 # name → what it says, and a check that returns what is wrong, empty if nothing is
 TruthTable = dict[str, tuple[str, Callable[[], str]]]
@@ -140,9 +140,9 @@ def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Re
 
 def parameters_with_values(record: type, values: Any, section: str) -> Any:
     """A record of parameters with the values that a caller gives by name; the others keep their defaults."""
-    made, errors = schema.read_section(section, settings_dict(values, f"check of {section}"), record)
-    if errors:
-        raise ScenarioError(errors)
+    errors = ErrorCollector()
+    made, _ = schema.read_section(section, settings_dict(values, f"check of {section}"), record, errors)
+    errors.raise_errors()
     return made
 
 

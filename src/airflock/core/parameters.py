@@ -7,12 +7,13 @@ constants in a kernel.
 
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple
 
-from airflock.support import ParameterError, is_number
+from airflock.support import ParameterError, is_number, suggest
 
 MAX_COMPONENTS = 64  # components of one vector; a driver's text holds a line for each
 
@@ -347,42 +348,51 @@ class Parameters(metaclass=VectorMeta):
     """
 
     def __post_init__(self) -> None:
-        faults = []
+        errors = []
         for name, declared, _ in declarations(self):
             value = getattr(self, name)
-            if isinstance(declared, Quantity):
-                # float() of a larger integer would raise; left as it is, it is refused in a line
-                # below.
-                if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**1023:
-                    value = float(value)
-                    object.__setattr__(self, name, value)  # 1 and 1.0 must not compile two kernels
-                fault = quantity_error(value, declared)
-            elif isinstance(declared, Choice):
-                fault = choice_error(value, declared)
-            elif isinstance(declared, Text):
-                fault = "" if isinstance(value, str) else f"= {value!r} is no text"
-            else:
-                fault = points_error(value, declared)
-                if not fault:
-                    object.__setattr__(self, name, _frozen(value))
-            if fault:
-                faults.append(f"{type(self).__name__}.{name} {fault}")
-        if faults:
-            raise ParameterError("\n".join(faults))
+            if not isinstance(value, float) and isinstance(declared, Quantity) and is_number(value):
+                with suppress(OverflowError):  # which no range holds
+                    object.__setattr__(self, name, value := float(value))  # 1 and 1.0 must not compile two kernels
+            if error := value_error(value, declared):
+                errors.append(f"{type(self).__name__}.{name} {error}")
+            elif isinstance(declared, Points):
+                object.__setattr__(self, name, _frozen(value))
+        if errors:
+            raise ParameterError("\n".join(errors))
+
+
+def value_error(value: Any, declared: Declaration) -> str:
+    """Return the error of a value, as the rest of a sentence that begins with its key; empty if valid."""
+    if isinstance(declared, Quantity):
+        return quantity_error(value, declared)
+    if isinstance(declared, Choice):
+        if isinstance(value, str) and value in declared.options:
+            return ""
+        hint = suggest(value, declared.options, lead="; ", cutoff=0.6)
+        return f"= {value!r} is none of {', '.join(declared.options)}{hint}"
+    if isinstance(declared, Text):
+        return "" if isinstance(value, str) else f"= {value!r} is not text"
+    return points_error(value, declared)
 
 
 def quantity_error(value: Any, declared: Quantity) -> str:
-    """Return the error of a value, as the rest of a sentence; empty if valid."""
+    """Return the error of a number, as the rest of a sentence; empty if valid."""
     if value is None and declared.optional:
         return ""
-    if not isinstance(value, float):
+    if not isinstance(value, float) and not is_number(value):
         return f"= {value!r} is not a number; give {declared.span}"
-    if not declared.low <= value <= declared.high:
-        text = telling_digits(value, lambda v: not declared.low <= v <= declared.high)
-        return f"= {format_with_unit(text, declared.unit)} lies outside {declared.span}"
-    if declared.whole and value != int(value):
-        return f"= {telling_digits(value, lambda v: v != int(v))} is not a whole number"
-    return ""
+    try:
+        value = float(value)
+    except OverflowError:
+        return f"= {format_with_unit('a whole number beyond 1e308', declared.unit)} lies outside {declared.span}"
+    if declared.whole and isfinite(value) and not value.is_integer():
+        digits = telling_digits(value, lambda v: v != int(v))
+        return f"= {digits} is not a whole number; give one in {declared.span}"
+    if declared.low <= value <= declared.high:
+        return ""
+    digits = telling_digits(value, lambda v: not declared.low <= v <= declared.high)
+    return f"= {format_with_unit(digits, declared.unit)} lies outside {declared.span}"
 
 
 def telling_digits(value: float, is_wrong: Callable[[float], bool]) -> str:
@@ -393,20 +403,17 @@ def telling_digits(value: float, is_wrong: Callable[[float], bool]) -> str:
     return next((text for text in texts if is_wrong(float(text))), repr(value))
 
 
-def choice_error(value: Any, declared: Choice) -> str:
-    """Return the error of a choice, as the rest of a sentence; empty if valid."""
-    known = isinstance(value, str) and value in declared.options
-    return "" if known else f"= {value!r} is none of {', '.join(declared.options)}"
-
-
 def points_error(value: Any, declared: Points) -> str:
     """Return the error of a list of points or polygons, as the rest of a sentence; empty if valid."""
-    try:
-        sound = _are_points(_frozen(value), declared.depth, declared.axes)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        sound = False
-    what = f"{'polygons, each a list of ' if declared.depth == 3 else ''}points of {declared.axes} finite numbers"
-    return "" if sound else f"is not a list of {what}"
+    with suppress(TypeError, ValueError, OverflowError, RecursionError):
+        if _are_points(_frozen(value), declared.depth, declared.axes):
+            return ""
+    if declared.axes > 3:
+        rows = f"rows of {declared.axes} numbers in {declared.unit}"
+        return f"is not a list of {rows}; it holds {declared.meaning}"
+    point = f"[east, north{', up' if declared.axes == 3 else ''}]"
+    what = f"points {point}" if declared.depth == 2 else f"polygons [{point}, ...]"
+    return f"is not a list of {what} in {declared.unit}"
 
 
 def _are_points(value: Any, depth: int, axes: int) -> bool:

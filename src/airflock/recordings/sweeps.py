@@ -2,6 +2,7 @@
 
 import hashlib
 import itertools
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +29,11 @@ from airflock.runs import (
     score_scenarios,
     unpublished,
 )
+<<<<<<< HEAD
 from airflock.scenarios import Scenario, check_seeds, scenario_variant, short_keys
+=======
+from airflock.scenarios import Scenario, build_scenario, check_seeds, keys_by_last_word, scenario_variant
+>>>>>>> b996a4a5 (Each key of a scenario is looked up, converted and checked in one pass; one collector of errors; grids, seeds and agents are counted before they are listed)
 from airflock.support import (
     ScenarioError,
     StudyError,
@@ -40,6 +45,7 @@ from airflock.support import (
 )
 
 ORDER = "polarisation"  # shown where nothing judges flights: the first that a set reports may be a constant speed
+MOST_POINTS = 100_000  # of a grid
 
 
 def sweep(
@@ -118,7 +124,8 @@ def sweep(
         beside = {"over": over, "settings": settings, "law": law}
         made = resumed_sweep(out if resume else None, trust=trust, **beside)
     else:
-        made = make_sweep(scenario, over or {}, check_seeds(seeds), settings, law, precision, device, trust=trust)
+        axes = {} if over is None else over  # what is no mapping is refused by its own line, pandas' NA too
+        made = make_sweep(scenario, axes, check_seeds(seeds), settings, law, precision, device, trust=trust)
     options = {"threads": threads, "on_done": done, "notify": say}
     return fly_sweep(made, scheduler=scheduler, out=out, resume=resume, **options)
 
@@ -192,7 +199,10 @@ def grid_points(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     lacking = [key for key, values in over.items() if isinstance(values, str) or not isinstance(values, Iterable)]
     if lacking:
         raise ScenarioError([f"{key} = {over[key]!r}: give the values to sweep over in a list" for key in lacking])
-    return [dict(zip(over, values, strict=True)) for values in itertools.product(*over.values())]
+    axes = [list(itertools.islice(values, MOST_POINTS + 1)) for values in over.values()]
+    if (count := math.prod(map(len, axes))) > MOST_POINTS:  # before a scenario is built at each
+        raise ScenarioError([f"over: a grid of {count} points or more, which is more than {MOST_POINTS}"])
+    return [dict(zip(over, values, strict=True)) for values in itertools.product(*axes)]
 
 
 def scenarios_at(
@@ -222,7 +232,7 @@ def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequenc
     errors: list[str] = []
     for key in points[0] if points and scenarios else ():
         if key == "seed" or any(key in reported_values(found.metrics.rule) for found in scenarios):
-            whole = " or ".join(short_keys.keys_by_last_word(scenarios[0].records).get(key, ()))
+            whole = " or ".join(keys_by_last_word(scenarios[0].records).get(key, ()))
             errors.append(f"{scenarios[0].name}: {key}: is a column of the table already; write {whole}")
     return errors
 

@@ -5,7 +5,6 @@ from . import (
     formats as formats,
     keys as keys,
     schema as schema,
-    short_keys as short_keys,
 )
 from .cost import (
     box_fits_cells as box_fits_cells,
@@ -102,6 +101,7 @@ from .sections import (
 from .settings import (
     TOP_LEVEL_KEYS as TOP_LEVEL_KEYS,
     entry_of_key as entry_of_key,
+    expand_short_keys as expand_short_keys,
     fault_declarations as fault_declarations,
     fault_key_value as fault_key_value,
     group_declarations as group_declarations,
@@ -109,8 +109,8 @@ from .settings import (
     has_fault as has_fault,
     is_fault_key as is_fault_key,
     is_group_key as is_group_key,
+    keys_by_last_word as keys_by_last_word,
     settings_dict as settings_dict,
     split_key as split_key,
     with_old_spread as with_old_spread,
 )
-from .short_keys import expand_short_keys as expand_short_keys

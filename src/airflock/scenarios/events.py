@@ -8,6 +8,7 @@ import math
 import operator
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
 
 from airflock.support import FlightError, ParameterError
@@ -101,9 +102,9 @@ def check_agents(number_or_list: Any, agents: int) -> list[int]:
     ]
     if not numbers:
         raise FlightError(f"agent = {number_or_list!r}: names no agent")
-    twice = [number for place, number in enumerate(numbers) if number in numbers[:place]]
-    if twice:
-        raise FlightError(f"agent = {number_or_list!r}: {twice[0]} is named twice")
+    if len(set(numbers)) < len(numbers):
+        twice = next(number for place, number in enumerate(numbers) if number in numbers[:place])
+        raise FlightError(f"agent = {number_or_list!r}: {twice} is named twice")
     return numbers
 
 
@@ -133,7 +134,9 @@ def check_seed(seed: Any) -> int:
 def check_seeds(seeds: int | Iterable[int]) -> list[int]:
     """Return the seeds of several flights: 0, 1, ... up to a count, or those of a list."""
     if isinstance(seeds, Iterable):
-        checked = [check_seed(seed) for seed in seeds]
+        checked = [check_seed(seed) for seed in islice(seeds, MAX_FLIGHTS + 1)]
+        if len(checked) > MAX_FLIGHTS:
+            raise ParameterError(f"seeds: more than {MAX_FLIGHTS} flights at a time")
     else:
         try:
             count = operator.index(seeds)

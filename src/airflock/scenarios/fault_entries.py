@@ -16,8 +16,7 @@ from airflock.scenarios import schema
 from airflock.scenarios.groups import Group, read_members
 from airflock.scenarios.named_code import build_from_file
 from airflock.scenarios.sections import Flight
-from airflock.scenarios.units import convert_units
-from airflock.support import AirflockError, suggest
+from airflock.support import INVALID, ErrorCollector, suggest
 
 if TYPE_CHECKING:
     from airflock.scenarios.scenario import Scenario
@@ -82,124 +81,119 @@ class FaultEntry:
 
 
 def read_fault_entries(
-    tables: Any, flight: Flight, groups: Sequence[Group], folder: Path | None = None, *,
+    tables: Any, flight: Flight, groups: Sequence[Group], errors: ErrorCollector, folder: Path | None = None, *,
     user_kinds: Mapping[str, Fault] | None = None, trust: bool = False,
-) -> tuple[tuple[FaultEntry, ...], list[str], list[str]]:  # fmt: skip
-    """Read the entries of [[faults]]; return them with notes on converted units and all errors, one line each.
+) -> tuple[FaultEntry, ...]:  # fmt: skip
+    """Read the entries of [[faults]]; notes on converted units and all errors are collected.
 
     user_kinds : kinds that the caller gives, by name
     """
-    agents, duration, sequential = int(flight.agents), flight.duration, flight.update == "sequential"
+    agents, duration = int(flight.agents), flight.duration
     if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(e, Mapping) for e in tables):
-        return (), [], ["faults is not a list of tables; write [[faults]]"]
+        errors.add("faults is not a list of tables; write [[faults]]")
+        return ()
     if len(tables) > MOST:
-        return (), [], [f"faults: {len(tables)} entries are more than {MOST}"]
+        errors.add(f"faults: {len(tables)} entries are more than {MOST}")
+        return ()
     sizes = {group.name: len(group.agents) for group in groups}
     wide = [sizes.get(str(e["group"]), 0) if "group" in e else agents for e in tables if "agents" not in e]
     if sum(wide) > MOST_AFFECTED:  # before their onsets are drawn, one by one
         of = f"all {agents} agents" if set(wide) == {agents} else f"groups or all of {agents} agents"
-        return (), [], [
+        errors.add(
             f"faults: {len(wide)} entries of {of} are {sum(wide):,} agents to look at, more than {MOST_AFFECTED:,}; "
             "write which agents each may hit (agents or group), or fewer entries"
-        ]  # fmt: skip
+        )
+        return ()
     entries: list[FaultEntry] = []
-    notes: list[str] = []
-    errors: list[str] = []
     kinds = {**KINDS, **(user_kinds or {})}
     for number, table in enumerate(tables):
-        entry, entry_notes, wrong = _entry(f"faults[{number}]", table, agents, groups, sequential, folder, kinds, trust)
-        notes += entry_notes
-        errors += wrong
-        entries += [entry] if entry and not wrong else []
+        where, wrong = f"faults[{number}]", ErrorCollector()
+        kind = _kind(where, table.get("kind"), folder, kinds, wrong, trust)
+        entry = _entry(where, table, kind, flight, groups, wrong)
         # A kind from a file keeps its name for the entries behind it; another kind of this name is
         # an error, as drivers tell kinds apart by their names.
-        if entry is not None:
-            if kinds.get(entry.fault.name, entry.fault) != entry.fault:
-                errors.append(f"faults[{number}].kind: {entry.fault.name} is the name of another kind already")
-            kinds[entry.fault.name] = entry.fault
+        if entry is not None and kinds.setdefault(kind.name, kind) != kind:
+            wrong.add(f"{where}.kind: {kind.name} is the name of another kind already")
+        if not errors.merge(wrong) and entry is not None:
+            entries.append(entry)
     if (onsets := sum(entry.expected_onsets(duration) for entry in entries)) > MOST_AFFECTED:
-        errors.append(
+        errors.add(
             f"faults: about {onsets:,.0f} agents to hit within duration = {duration:g} s are more than "
             f"{MOST_AFFECTED:,}; lower per_hour, number or duration"
         )
-    return tuple(entries), notes, errors
+    return tuple(entries)
 
 
 def _entry(
-    where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None,
-    kinds: Mapping[str, Fault], trust: bool,
-) -> tuple[FaultEntry | None, list[str], list[str]]:  # fmt: skip
-    kind, errors = _kind(where, table.get("kind"), folder, kinds, trust)
-    names = ("kind", "agents", "group")
-    timing = {key: value for key, value in table.items() if key in ENTRY_KEYS and key not in names}
-    when, notes, wrong = _record(where, timing, FaultTiming)
-    errors += wrong
+    where: str, table: Mapping[str, Any], kind: Any, flight: Flight, groups: Sequence[Group], errors: ErrorCollector
+) -> FaultEntry | None:
+    """Read one entry; None where it has errors. Its kind is INVALID where nobody can judge its numbers."""
+    apart = ("kind", "agents", "group")
+    timing = {key: value for key, value in table.items() if key in ENTRY_KEYS and key not in apart}
+    when: Any = _record(where, timing, FaultTiming, errors)
     numbers = None
-    if kind is not None:  # else nobody can judge its numbers
+    if kind is not INVALID:
         rest = {key: value for key, value in table.items() if key not in ENTRY_KEYS}
-        numbers, number_notes, wrong = _record(where, rest, kind.Parameters, ENTRY_KEYS)
-        notes, errors = notes + number_notes, errors + wrong
-    who, wrong = _read_agents(where, table, agents, groups)
-    errors += wrong
+        numbers = _record(where, rest, kind.Parameters, errors, ENTRY_KEYS)
+    who = _read_agents(where, table, int(flight.agents), groups, errors)
     if when is not None:
-        errors += _time_errors(where, when, agents if who is None else len(who))
-    if kind is None:
-        return None, notes, errors
-    if sequential and PERCEPTION & set(kind.rules):
-        errors.append(
+        errors.add(*_time_errors(where, when, int(flight.agents) if who is INVALID else len(who)))
+    if kind is INVALID:
+        return None
+    if flight.update == "sequential" and PERCEPTION & set(kind.rules):
+        errors.add(
             f"{where}.kind = {kind.name!r} disturbs what agents know of each other; update = 'sequential' is for agents"
             " that see each other as they are"
         )
-    if when is None or numbers is None or who is None:
-        return None, notes, errors
-    errors += _end_errors(where, when, kind, numbers)
+    if when is None or numbers is None or who is INVALID:
+        return None
+    errors.add(*_end_errors(where, when, kind, numbers))
     count = 1 if when.number is None and when.per_hour is not None else when.number
-    entry = FaultEntry(
+    return FaultEntry(
         kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
         math.inf if when.until is None else when.until, math.inf if when.lasts is None else when.lasts,
     )  # fmt: skip
-    return entry, notes, errors
 
 
 def _record(
-    where: str, table: Mapping[str, Any], record: type, beside: Sequence[str] = ()
-) -> tuple[Any, list[str], list[str]]:
-    """Make a record from keys of an entry, in SI units; return it with notes and errors."""
-    document, notes, errors = convert_units({where: table}, {where: record})
-    result, wrong = schema.read_section(where, document[where], record, beside)
-    return (None if errors else result), notes, errors + wrong
+    where: str, table: Mapping[str, Any], record: type, errors: ErrorCollector, beside: Sequence[str] = ()
+) -> Any:
+    """Make a record from keys of an entry; None where one has an error, as its default would seem to be missing."""
+    wrong = ErrorCollector()
+    result, _ = schema.read_section(where, table, record, wrong, beside=beside)
+    return None if errors.merge(wrong) else result
 
 
 def _kind(
-    where: str, name: Any, folder: Path | None, kinds: Mapping[str, Fault], trust: bool
-) -> tuple[Fault | None, list[str]]:
-    """Find a kind by its name, or in a user's own file, which runs only with `trust`."""
+    where: str, name: Any, folder: Path | None, kinds: Mapping[str, Fault], errors: ErrorCollector, trust: bool
+) -> Fault:
+    """Find a kind by its name, or in a user's own file, which runs only with `trust`; INVALID where there is none."""
     if isinstance(name, str) and name in kinds:
-        return kinds[name], []
+        return kinds[name]
     if isinstance(name, str) and name.endswith(".py"):
-        try:
-            return build_from_file(fault, f"{where}.kind", name, folder, trust=trust), []
-        except AirflockError as wrong:
-            return None, str(wrong).splitlines()
+        return errors.read(build_from_file, fault, f"{where}.kind", name, folder, trust=trust)
     hint = suggest(name, kinds, f"known: {', '.join(kinds)}, or a file that ends in .py")
-    return None, [f"{where}.kind = {name!r}: unknown kind of fault; {hint}"]
+    errors.add(f"{where}.kind = {name!r}: unknown kind of fault; {hint}")
+    return INVALID  # type: ignore[no-any-return]
 
 
 def _read_agents(
-    where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group]
-) -> tuple[Sequence[int] | None, list[str]]:
-    """Return the agents that an entry may affect, or None, with the errors."""
+    where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group], errors: ErrorCollector
+) -> Sequence[int]:
+    """Return the agents that an entry may affect; INVALID where nobody can say which."""
     if "agents" in table and "group" in table:
-        return None, [f"{where} names agents and a group; give one of them"]
+        errors.add(f"{where} names agents and a group; give one of them")
+        return INVALID  # type: ignore[no-any-return]
     if "agents" in table:
-        return read_members(f"{where}.agents", table["agents"], agents)
+        return read_members(f"{where}.agents", table["agents"], agents, errors)
     if "group" not in table:
-        return range(agents), []
+        return range(agents)
     named = {group.name: group.agents for group in groups}
     if table["group"] in named:
-        return named[table["group"]], []
+        return named[table["group"]]
     known = f"known: {', '.join(named)}" if named else "the scenario has none; write [[groups]]"
-    return None, [f"{where}.group = {table['group']!r}: unknown group; {known}"]
+    errors.add(f"{where}.group = {table['group']!r}: unknown group; {known}")
+    return INVALID  # type: ignore[no-any-return]
 
 
 def _time_errors(where: str, when: FaultTiming, may: int) -> list[str]:

@@ -16,9 +16,9 @@ from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.settings import settings_dict
-from airflock.scenarios.units import convert_units
 from airflock.support import (
     AirflockError,
+    ErrorCollector,
     FormatError,
     ScenarioError,
     as_error,
@@ -151,21 +151,15 @@ def load(
         own_law = None if law is None else law_from_caller(law)
         of_groups = {own.name: own for own in map(law_from_caller, _several(laws))}
         caller_parts = replace(caller_parts, law=own_law, fault_kinds=_kinds(faults), laws=of_groups)
-        notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, field_notes, wrong = with_field(document, settings_dict(settings, where), folder)
+        errors = ErrorCollector()
+        errors.notes += [f"extends {base}: what is not given here is taken from there"] if base else []
+        document, settings = with_field(document, settings_dict(settings, where), folder, errors)
         if own_law is not None:
             document = _with_robot_of(document, where, folder, trust)
             kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else own_law.name
             document = {**document, "model": {"kind": kind}, "published": {}}
         return build_scenario(
-            document,
-            where,
-            settings,
-            folder=folder,
-            caller_parts=caller_parts,
-            notes=notes + field_notes,
-            known_errors=wrong,
-            trust=trust,
+            document, where, settings, folder=folder, caller_parts=caller_parts, errors=errors, trust=trust
         )
 
 
@@ -209,9 +203,8 @@ def _with_given(
 
     Giving a part is consent to run it. Raises ScenarioError.
     """
-    document = dict(document)
+    document, errors = dict(document), ErrorCollector()
     rules: dict[str, Any] = {}
-    errors: list[str] = []
     for family, part in given:
         if part is None:
             continue
@@ -219,13 +212,13 @@ def _with_given(
         # A name of the package needs no object: the document finds it by the name.
         if not (isinstance(part, str) and part in family):
             own_part, more = part_from_caller(family, part)
-            errors += more
+            errors.add(*more)
             if own_part is None:
                 continue
             rules[family.section], kind = own_part, own_part.name
         document[family.section] = {**kept_keys(family, table, kind), "kind": kind}
     if errors:
-        raise ScenarioError(errors)
+        raise ScenarioError(errors.errors)
     return document, CallerParts(**rules)
 
 
@@ -371,54 +364,44 @@ INSTEAD = {"arena": "square", "side": 1e6}  # of a file that cannot be read, so 
 
 
 def with_field(
-    document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None
-) -> tuple[dict[str, Any], Mapping[str, Any], tuple[str, ...], tuple[str, ...]]:
-    """Replace world.file by the keys of [world] that the map file stands for.
+    document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None, errors: ErrorCollector
+) -> tuple[dict[str, Any], Mapping[str, Any]]:
+    """Replace world.file by the keys of [world] that the map file stands for; return document and settings without it.
 
     It is read when a person loads a scenario, and nowhere else: neither a recording nor an event of
     one names a file.
 
     folder : of the scenario file, where its files are looked for
-
-    Returns
-    -------
-    Document and settings without the file, notes, and errors.
     """
     table = document.get("world", {})
     if not isinstance(table, Mapping):
-        return dict(document), settings, (), ()
+        return dict(document), settings
     world = {**table, **{key[6:]: value for key, value in settings.items() if key.startswith("world.")}}
     name = value_of(world.get("file", ""))
     if not isinstance(name, str) or not name:
-        return dict(document), settings, (), ()
-    errors = [f"world.{key}: is given, and world.file as well; take one of them out" for key in GIVEN if key in world]
+        return dict(document), settings
+    wrong = ErrorCollector()
+    twice = [f"world.{key}" for key in GIVEN if key in world]
     shape = value_of(settings.get("world.arena", "polygon"))
-    if shape != "polygon":
-        errors.append(f"world.arena = {shape!r}: is given, and world.file as well; take one of them out")
+    twice += [] if shape == "polygon" else [f"world.arena = {shape!r}"]
+    wrong.add(*(f"{key}: is given, and world.file as well; take one of them out" for key in twice))
     path = expand_path(name) if is_file(name) or folder is None else folder / expand_path(name)
-    errors += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
-    simplify, more = _metres(world)
-    errors += more
+    if not is_file(path):
+        wrong.add(f"world.file = {name!r}: no such file")
+    outlines = {key: value for key, value in world.items() if key == "simplify"}
+    numbers, _ = schema.read_section("world", outlines, arena.Parameters, wrong)
+    errors.notes += wrong.notes
     kept = {key: value for key, value in table.items() if key not in ("file", "simplify", "arena", "walls")}
     rest = {key: value for key, value in settings.items() if key not in FROM_FILE}
-    if not errors:
-        try:
-            space = str(value_of(world.get("dimensions", "2"))) == "3"
-            field = load_field(path, simplify=simplify, space=space)
-        except ScenarioError as error:
-            errors += str(error).splitlines()
-        else:
-            return {**document, "world": {**field.keys, **kept}}, rest, (field.note,), ()
+    if not wrong:
+        space = str(value_of(world.get("dimensions", "2"))) == "3"
+        with wrong.collecting():
+            field = load_field(path, simplify=numbers.simplify, space=space)
+            errors.notes.append(field.note)
+            return {**document, "world": {**field.keys, **kept}}, rest
+    errors.add(*wrong.errors)
     # A very large square stands in for the unreadable field, so that no further error about the
     # arena follows.
     kept = {key: value for key, value in kept.items() if key not in GIVEN} | INSTEAD
     rest = {key: value for key, value in rest.items() if key.removeprefix("world.") not in (*GIVEN, *INSTEAD, "walls")}
-    return {**document, "world": kept}, rest, (), tuple(errors)
-
-
-def _metres(world: Mapping[str, Any]) -> tuple[float, list[str]]:
-    """Return by how much outlines may move, m, and the errors of that number."""
-    given = {"world": {key: value for key, value in world.items() if key == "simplify"}}
-    converted, _, errors = convert_units(given, {"world": arena.Parameters})
-    numbers, more = schema.read_section("world", converted["world"], arena.Parameters)
-    return (numbers.simplify if numbers is not None else 0.0), errors + more
+    return {**document, "world": kept}, rest

@@ -16,8 +16,8 @@ from airflock.parts.steering import law_for_command
 from airflock.scenarios import schema
 from airflock.scenarios.named_code import find_law
 from airflock.scenarios.scenario_checks import body_errors, sensor_errors, silence_errors
-from airflock.scenarios.units import check_spreads, convert_units, relative_spread, standard_deviation, with_share_hint
-from airflock.support import AirflockError
+from airflock.scenarios.units import read_spread, standard_deviation
+from airflock.support import INVALID, ErrorCollector
 
 LETTERS = {
     "model": "p",
@@ -41,8 +41,8 @@ class Group:
 
     name: str
     agents: Sequence[int]
-    numbers: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    spread: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    numbers: dict[tuple[str, str], float] = field(default_factory=dict)
+    spread: dict[tuple[str, str], float] = field(default_factory=dict)
     law: tuple[Model, Any] | None = None
 
     def without(self, letter: str) -> "Group":
@@ -90,21 +90,19 @@ class GroupLawReader:
     walls: bool = False
     _read: dict[str, Model] = field(default_factory=dict)
 
-    def named(self, where: str, table: Any) -> tuple[tuple[Model, Any] | None, list[str]]:
-        """Return the law of a group, None for that of the flock, and the errors, one line each."""
+    def named(self, where: str, table: Any, errors: ErrorCollector) -> Any:
+        """Return the law of a group, None for that of the flock; INVALID where it has errors."""
         if not isinstance(table, Mapping):
-            return None, []  # reported where its numbers are read
+            return None  # reported where its numbers are read
         kind = table.get("kind", self.kind)
-        try:
-            law = self._found(where, kind)
-        except AirflockError as error:
-            return None, str(error).splitlines()
-        errors = self._misfits(where, kind, law)
-        record, more = self._chosen(where, table, law)
-        if errors or more:
-            return None, errors + more
+        wrong = ErrorCollector()
+        if (law := wrong.read(self._found, where, kind)) is not INVALID:
+            wrong.add(*self._misfits(where, kind, law))
+            record = self._chosen(where, table, law, wrong)
+        if errors.merge(wrong):
+            return INVALID
         same = law == self.model and choices(record) == choices(self.parameters)
-        return (None if same else (law, record)), []
+        return None if same else (law, record)
 
     def _found(self, where: str, kind: Any) -> Model:
         known = {**self._read, **self.own, self.model.name: self.model}
@@ -133,20 +131,20 @@ class GroupLawReader:
             )
         return errors
 
-    def _chosen(self, where: str, table: Mapping[str, Any], found: Model) -> tuple[Any, list[str]]:
+    def _chosen(self, where: str, table: Mapping[str, Any], found: Model, errors: ErrorCollector) -> Any:
         """Return the parameters of a group's law with its own choices; its numbers come later."""
         known = {name for name, declared, _ in declarations(found.Parameters) if isinstance(declared, Choice)}
         own = {key: schema.value_of(value) for key, value in table.items() if key in known}
-        made, errors = schema.read_section(where, own, found.Parameters)
-        if errors or made is None:
-            return None, errors
+        made, _ = schema.read_section(where, own, found.Parameters, errors)
+        if made is None:
+            return None
         # Choices select the text of a driver, so they are part of the law; numbers are columns of
         # its row and stay apart.
         base = self.parameters if found == self.model else found.Parameters()
         record = replace(base, **{key: getattr(made, key) for key in own})
         if found == self.model and found.flock is not None and choices(record) != choices(base):
-            return None, [f"{where}: model {found.name} solves for the whole flock, with one set of choices"]
-        return record, []
+            errors.add(f"{where}: model {found.name} solves for the whole flock, with one set of choices")
+        return record
 
 
 def group_errors(
@@ -215,16 +213,17 @@ def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]
     return tuple(names)
 
 
-def read_members(where: str, value: Any, agents: int) -> tuple[Sequence[int] | None, list[str]]:
-    """Read a list of numbers of agents; return them, or None, with the error, one line."""
+def read_members(where: str, value: Any, agents: int, errors: ErrorCollector) -> Sequence[int]:
+    """Read a list of numbers of agents; INVALID where it is none."""
     whole = isinstance(value, Sequence) and not isinstance(value, str)
     if not whole or not value or not all(isinstance(k, int) and not isinstance(k, bool) for k in value):
-        return None, [f"{where} = {value!r} is not a list of numbers of agents, 0 to {agents - 1}"]
-    wrong = [k for k in value if not 0 <= k < agents]
-    if wrong:
-        return None, [f"{where}: there is no agent {wrong[0]}; this flock has the agents 0 to {agents - 1}"]
+        errors.add(f"{where} = {value!r} is not a list of numbers of agents, 0 to {agents - 1}")
+        return INVALID  # type: ignore[no-any-return]
     members = tuple(sorted(set(value)))
-    return (range(agents) if len(members) == agents else members), []
+    if wrong := [k for k in (members[0], members[-1]) if not 0 <= k < agents]:
+        errors.add(f"{where}: there is no agent {wrong[0]}; this flock has the agents 0 to {agents - 1}")
+        return INVALID  # type: ignore[no-any-return]
+    return range(agents) if len(members) == agents else members
 
 
 def group_names(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
@@ -242,67 +241,62 @@ def count_of_share(value: Any, agents: int) -> Any:
 
 
 def read_groups(
-    tables: Any, agents: int, records: Mapping[str, type], laws: GroupLawReader | None = None
-) -> tuple[tuple[Group, ...], list[str], list[str]]:
-    """Read groups; return them with notes on converted units and all errors, one line each.
+    tables: Any,
+    agents: int,
+    records: Mapping[str, type],
+    errors: ErrorCollector,
+    laws: GroupLawReader | None = None,
+) -> tuple[Group, ...]:
+    """Read groups; notes on converted units and all errors are collected.
 
     records : "model", "body" and "sensors" → record of their parameters
     laws    : finds the law that a group's section model names
     """
     if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(g, Mapping) for g in tables):
-        return (), [], ["groups is not a list of tables; write [[groups]]"]
-    who, errors = _agents(tables, agents)
+        errors.add("groups is not a list of tables; write [[groups]]")
+        return ()
+    who = _agents(tables, agents, errors)
     groups: list[Group] = []
-    notes: list[str] = []
     for number, table in enumerate(tables):
         where = f"groups[{number}]"
-        errors += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
+        errors.add(*(f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS))
         name = table.get("name", f"group_{number}")
         if not isinstance(name, str) or not name or name in {group.name for group in groups}:
-            errors.append(f"{where}.name = {name!r} is not a name of its own")
+            errors.add(f"{where}.name = {name!r} is not a name of its own")
             name = where
-        numbers: dict[tuple[str, str], float] = {}
-        spread: dict[tuple[str, str], float] = {}
-        law, own = (None, []) if laws is None else laws.named(f"{where}.model", table.get("model", {}))
-        errors += own
-        for section, letter in LETTERS.items():
-            if section in records and not (section == "model" and own):
+        group = Group(name, who[number], {}, {})
+        law = None if laws is None else laws.named(f"{where}.model", table.get("model", {}), errors)
+        for section in LETTERS:
+            if section in records and not (section == "model" and law is INVALID):
                 record = type(law[1]) if law and section == "model" else records[section]
-                values, spreads, unit_notes, wrong = _section(f"{where}.{section}", table.get(section, {}), record)
-                numbers |= {(letter, key): value for key, value in values.items()}
-                spread |= {(letter, key): value for key, value in spreads.items()}
-                notes += unit_notes
-                errors += wrong
-        groups.append(Group(name, who[number], numbers, spread, law))
-    return tuple(groups), notes, errors
+                _read_numbers(where, section, table.get(section, {}), record, group, errors)
+        groups.append(replace(group, law=None if law is INVALID else law))
+    return tuple(groups)
 
 
-def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[Sequence[int]], list[str]]:
+def _agents(tables: Sequence[Mapping[str, Any]], agents: int, errors: ErrorCollector) -> list[Sequence[int]]:
     """Return the members of each group: a list, so many of the next ones, or all that are left."""
-    errors: list[str] = []
-    members: list[Sequence[int]] = [()] * len(given)
+    members: list[Sequence[int]] = [()] * len(tables)
     taken: set[int] = set()
     # Lists are read first, then counts, then the one group that takes the rest: so the order of
     # groups does not change who is listed.
-    for number, table in enumerate(given):
+    for number, table in enumerate(tables):
         if isinstance(table.get("agents"), (list, tuple)):
-            listed, wrong = read_members(f"groups[{number}].agents", table["agents"], agents)
-            errors += wrong
-            twice = sorted(taken & set(listed or ()))
-            if twice:
-                errors.append(f"groups[{number}].agents: agent {twice[0]} is in another group already")
-            members[number] = listed or ()
-            taken |= set(listed or ())
+            listed = read_members(f"groups[{number}].agents", table["agents"], agents, errors)
+            members[number] = () if listed is INVALID else listed
+            if twice := sorted(taken & set(members[number])):
+                errors.add(f"groups[{number}].agents: agent {twice[0]} is in another group already")
+            taken |= set(members[number])
     left = _without(agents, taken)
     rest = []
-    for number, table in enumerate(given):
+    for number, table in enumerate(tables):
         count = count_of_share(table.get("agents"), agents)
         if count is None:
             rest.append(number)
         elif not isinstance(count, (list, tuple)):
             whole = isinstance(count, (int, float)) and not isinstance(count, bool) and count % 1 == 0
             if not whole or not 1 <= count <= len(left):
-                errors.append(
+                errors.add(
                     f"groups[{number}].agents = {count!r} is neither a list of agents, a share such as '20 %', nor a "
                     f"number of them up to {len(left)}, as many as are left of {agents}"
                 )
@@ -311,63 +305,45 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[Seque
     for number in rest[:1]:
         members[number] = left
         if not left:
-            errors.append(f"groups[{number}] has no agents, and no agent is left for it")
-    errors += [
-        f"groups[{number}].agents is missing; only one group may take the agents that are left" for number in rest[1:]
-    ]
-    return members, errors
+            errors.add(f"groups[{number}] has no agents, and no agent is left for it")
+    for number in rest[1:]:
+        errors.add(f"groups[{number}].agents is missing; only one group may take the agents that are left")
+    return members
 
 
-def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], dict[str, float], list[str], list[str]]:
-    """Read one section of a group; return numbers, spreads, notes and errors."""
+# keys that all agents share, and why
+SHARED = {
+    ("sensors", "period"): "all measure and decide at the same times; set sensors.period",
+    ("body", "delay"): "all bodies follow their commands after one dead time; set body.delay",
+}
+
+
+def _read_numbers(of: str, section: str, table: Any, record: type, group: Group, errors: ErrorCollector) -> None:
+    """Read one section of a group into its numbers and their spreads."""
+    where, letter = f"{of}.{section}", LETTERS[section]
     if not isinstance(table, Mapping):
-        return {}, {}, [], [f"{where} = {table!r} is not a table of numbers"]
+        errors.add(f"{where} = {table!r} is not a table of numbers")
+        return
     known = {name: declared for name, declared, _ in declarations(record)}
     values: dict[str, Any] = {}
-    spreads: dict[str, Any] = {}
-    errors: list[str] = []
-    for key, value in table.items():
-        if where.endswith("model") and (key == "kind" or isinstance(known.get(key), Choice)):
-            continue
-        if key == "kind" or isinstance(known.get(key), Choice):
-            errors.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
-        elif key == "period" and where.endswith("sensors"):
-            errors.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
-        elif key == "delay" and where.endswith("body"):
-            errors.append(f"{where}.{key}: all bodies follow their commands after one dead time; set body.delay")
-        elif isinstance(value, Mapping) and "spread" in value:
-            unit = {"unit": value["unit"]} if "unit" in value else {}
-            share = relative_spread(value["spread"], known.get(key))
-            absolute = {"value": value["spread"], **unit} if unit else value["spread"]
-            spreads[key] = absolute if share is None else share
-            rest = {name: entry for name, entry in value.items() if name != "spread"}
-            inner = rest.get("value")  # a setting beside a spread with a unit may be a table
-            values |= {key: inner if isinstance(inner, Mapping) else rest} if "value" in rest else {}
+    for key, entry in table.items():
+        declared = known.get(key)
+        if key == "kind" or isinstance(declared, Choice):
+            if section != "model":  # its choices are those of its law
+                errors.add(f"{where}.{key}: {ONE[section]}; only numbers differ from group to group")
+        elif (section, key) in SHARED:
+            errors.add(f"{where}.{key}: {SHARED[section, key]}")
+        elif isinstance(entry, Mapping) and "spread" in entry and isinstance(declared, Quantity):
+            rest = {name: part for name, part in entry.items() if name != "spread"}
+            spread = read_spread(f"{where}.{key}.spread", entry["spread"], rest.get("unit", ""), declared, errors)
+            group.spread[letter, key] = 0.0 if spread is None else spread
+            if "value" in rest:  # a setting beside a spread with a unit may be a table
+                values[key] = rest["value"] if isinstance(rest["value"], Mapping) else rest
         else:
-            values[key] = value
-    # Spreads are converted under a section name of their own, so that errors can tell a number from
-    # its spread.
-    apart = f"{where}.spread"
-    converted, unit_notes, unfit = convert_units({where: values, apart: spreads}, {where: record, apart: record})
-    notes = [_as_written(line, where, apart) for line in unit_notes]
-    wrong = [f"{_as_written(line, where, apart)}{with_share_hint(line, apart, known)}" for line in unfit]
-    record_of_group, more = schema.read_section(where, converted[where], record)
-    errors += wrong + more
-    off, more = check_spreads(where, converted[apart], known)
-    numbers = (
-        {key: float(getattr(record_of_group, key)) for key in converted[where]}
-        if record_of_group is not None and not more
-        else {}
-    )
-    return numbers, off, notes, errors + more
-
-
-def _as_written(line: str, where: str, apart: str) -> str:
-    """Rewrite a line about a spread with the key that a file has for it."""
-    if not line.startswith(f"{apart}."):
-        return line
-    key, _, rest = line.removeprefix(f"{apart}.").partition(" ")
-    return f"{where}.{key}.spread {rest}"
+            values[key] = entry
+    made, values = schema.read_section(where, values, record, errors)
+    if made is not None:
+        group.numbers.update({(letter, key): float(getattr(made, key)) for key in values})
 
 
 def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from airflock.core import (
     Choice,
     Declaration,
+    Kind,
     PacketParameters,
     Points,
     Quantity,
@@ -255,10 +256,14 @@ UNDECLARED_KEYS: Mapping[str, Mapping[str, UndeclaredKey]] = {
     },
 }
 
-DRAFT = "http://json-schema.org/draft-07/schema#"  # read alike by Taplo, by VS Code and by validators
+DRAFT = "http://json-schema.org/draft-07/schema#"  # Taplo, VS Code and validators read it
 NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*"  # before a unit, in text
 OWN_FILE = {"type": "string", "pattern": r"\.py$"}
-TYPES = {"text": {"type": "string"}, "list": {"type": ["array", "number", "string"]}, "table": {"type": "object"}}
+TYPES: Mapping[str, dict[str, Any]] = {
+    "text": {"type": "string"},
+    "list": {"type": ["array", "number", "string"]},
+    "table": {"type": "object"},
+}
 
 
 def json_schema() -> dict[str, Any]:
@@ -272,12 +277,11 @@ def json_schema() -> dict[str, Any]:
     >>> keys.json_schema()["properties"]["agents"]["default"]
     100.0
     """
-    records = {
-        each.section or "faults": {
-            name: getattr(one, "Parameters", None) or SECTIONS[each.section] for name, one in each.items()
-        }
-        for each in (MODELS, KINDS, *PART_KINDS)
-    }
+    records: dict[str, dict[str, type]] = {}
+    every: tuple[Kind[Any], ...] = (MODELS, KINDS, *PART_KINDS)
+    for each in every:
+        own = {name: getattr(one, "Parameters", None) for name, one in each.items()}
+        records[each.section or "faults"] = {name: one or SECTIONS[each.section] for name, one in own.items()}
     kinds: dict[str, dict[str, list[str]]] = {name: {} for name in records}  # kinds of one record share a table
     tables: dict[str, dict[str, Any]] = {}
     for section, of in records.items():
@@ -294,7 +298,7 @@ def json_schema() -> dict[str, Any]:
     group = _closed(_undeclared("groups") | of_group)
     top |= {name: {"type": "array", "items": items} for name, items in (("faults", top["faults"]), ("groups", group))}
     definitions = {name: _closed(values) for name, values in tables.items()}
-    for unit in {key.unit for key in keys() if key.kind == "number"}:
+    for unit in sorted({key.unit for key in keys() if key.kind == "number"}):
         units = sorted(unit_names(unit))
         pattern = rf"{NUMBER}({'|'.join(map(re.escape, units))})\s*$"
         definitions[f"text.{to_identifier(unit)}"] = {"type": "string", "pattern": pattern if units else "^$"}
@@ -369,7 +373,7 @@ def _section_by_kind(
     kind: dict[str, Any] = {"anyOf": [{"enum": sorted(name for names in kinds.values() for name in names)}, OWN_FILE]}
     meaning = UNDECLARED_KEYS[""].get(f"{section}.kind") or UNDECLARED_KEYS["faults"]["kind"]
     about["kind"] = {"description": meaning.meaning} | about["kind"] | {"anyOf": [*kind["anyOf"], _long(kind, {})]}
-    # Editors complete from these, and what a key may hold is said by kind: two laws may share the name of a number.
+    # Editors complete from these, and judge by kind what a key may hold: two laws may share the name of a number.
     schema = {"type": "object", "properties": about}
     if spread:
         return schema | {"if": {"properties": {"kind": OWN_FILE}, "required": ["kind"]}, "else": every}

@@ -32,32 +32,32 @@ from airflock.parts.steering import law_for_command
 from airflock.scenarios.named_code import build_from_file, find_law
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
-from airflock.support import AirflockError
+from airflock.support import INVALID, ErrorCollector
 
 T = TypeVar("T")
 PART_KINDS: tuple[Kind[Any], ...] = (SETS, BODIES, SENSORS, RADIOS, TOPOLOGIES)  # those that a section names
 
 
 def part_by_name(
-    kind: Kind[T], name: Any, folder: Path | None = None, *, trust: bool = False
-) -> tuple[T | None, list[str]]:
-    """Find a part by its name, or in a file, which runs only with trust; return it, or None, with the errors."""
+    kind: Kind[T], name: Any, errors: ErrorCollector, folder: Path | None = None, *, trust: bool = False
+) -> T:
+    """Find a part by its name, or in a file, which runs only with trust; INVALID where there is none."""
     if name in kind:
-        return kind[name], []
+        return kind[name]
     key = f"{kind.section}.kind".lstrip(".")
     # Only the ending makes a name a file: a misspelt name must never run code.
     if isinstance(name, str) and name.endswith(".py"):
-        try:
-            return build_from_file(kind.make, key, name, folder, trust=trust), []
-        except AirflockError as error:
-            return None, str(error).splitlines()
-    return None, [f"{key} = {name!r}: {kind.unknown(name, ', or a file that ends in .py')}"]
+        return errors.read(build_from_file, kind.make, key, name, folder, trust=trust)
+    errors.add(f"{key} = {name!r}: {kind.unknown(name, ', or a file that ends in .py')}")
+    return INVALID  # type: ignore[no-any-return]
 
 
 def part_from_caller(kind: Kind[T], part: Any) -> tuple[T | None, list[str]]:
     """Make a part from a member, a namespace, a name or a file of the caller; return it, or None, with errors."""
     if isinstance(part, (str, os.PathLike)):
-        return part_by_name(kind, str(part), trust=True)
+        errors = ErrorCollector()
+        named = part_by_name(kind, str(part), errors, trust=True)
+        return (None if named is INVALID else named), errors.errors
     if kind.take is not None:
         return kind.take(part), []
     return part if isinstance(part, kind.member) else kind.make(part, ""), []
@@ -111,14 +111,6 @@ def without_unknown_numbers(document: dict[str, Any], section: str, record: type
     return {**document, section: {key: value for key, value in given.items() if key in known}}
 
 
-def model_table(document: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str]]:
-    """Return the section of the law; an empty one and an error where it is no table."""
-    table = document.get("model", {})
-    if isinstance(table, Mapping):
-        return table, []
-    return {}, [f"model = {table!r} is not a table; write model.kind = {table!r}"]
-
-
 DESCENT = model(descent, "drag_descent")
 
 
@@ -156,8 +148,8 @@ class ScenarioParts(NamedTuple):
 
 
 def collect_parts(
-    document: dict[str, Any], caller_parts: CallerParts, folder: Path | None, *, trust: bool
-) -> tuple[ScenarioParts, dict[str, Any], list[str]]:
+    document: dict[str, Any], caller_parts: CallerParts, folder: Path | None, errors: ErrorCollector, *, trust: bool
+) -> tuple[ScenarioParts, dict[str, Any]]:
     """Find all parts that a document names.
 
     Parameters
@@ -168,71 +160,62 @@ def collect_parts(
 
     Returns
     -------
-    The parts, with a stand-in for each missing one; the document without numbers that no stand-in knows; the errors.
+    The parts, with a stand-in for each missing one; the document without numbers that no stand-in knows.
     """
+    missing: list[str] = []
 
-    def one(kind: Kind[T], mine: T | None, usual: str = "") -> tuple[T, list[str]]:
-        """Return the caller's part or the document's; the default one, with errors, if it is missing."""
+    def one(kind: Kind[T], mine: T | None, usual: str = "") -> T:
+        """Return the caller's part or the document's; the default one if it is missing."""
         if mine is not None:
-            return mine, []
-        part, errors = part_by_name(kind, named_kind(kind, document, usual), folder, trust=trust)
-        return kind[usual or kind.default] if part is None else part, errors
+            return mine
+        part = part_by_name(kind, named_kind(kind, document, usual), errors, folder, trust=trust)
+        if part is INVALID:
+            missing.append(kind.section)
+            return kind[usual or kind.default]
+        return part
 
-    law, errors = _law(document, caller_parts, folder, trust)
+    law = _law(document, caller_parts, folder, errors, trust)
     # A law that commands an acceleration needs another default body than one that commands a
     # velocity.
     usual = default_body(law.command if law else "velocity")
-    body, of_body = one(BODIES, caller_parts.body, usual)
-    if law is not None and not of_body:
+    body = one(BODIES, caller_parts.body, usual)
+    if law is not None and "body" not in missing:
         law = law_for_command(law, body.accepts)
-    # Check the rest of the document with a body that fits, so that one wrong name does not cause
-    # ten more errors.
-    if of_body and caller_parts.body is None:
-        body = BODIES[usual]
-    metrics, of_metrics = one(SETS, caller_parts.metrics)
-    sensors, of_sensor = one(SENSORS, caller_parts.sensors)
-    transmission, of_radio = one(RADIOS, caller_parts.radio)
-    if of_radio:
+    metrics = one(SETS, caller_parts.metrics)
+    sensors = one(SENSORS, caller_parts.sensors)
+    transmission = one(RADIOS, caller_parts.radio)
+    if "radio" in missing:
         transmission = Radio(str(named_kind(RADIOS, document)), PacketParameters)  # the common numbers are judged
-    topology, of_topology = caller_parts.topology, list[str]()
+    topology = caller_parts.topology
     # Topologies without numbers of their own share one record, in which the kind is a choice, and
     # are judged as that.
     name = named_kind(TOPOLOGIES, document)
     own = getattr(TOPOLOGIES.get(str(name)), "Parameters", None)
     if topology is None and (own is not None or str(name).endswith(".py")):
-        topology, of_topology = part_by_name(TOPOLOGIES, name, folder, trust=trust)
+        topology = part_by_name(TOPOLOGIES, name, errors, folder, trust=trust)
+        if topology is INVALID:
+            topology, document = None, {**document, "topology": {}}
     parts = ScenarioParts(law, body, metrics, sensors, transmission, topology)
-    errors_of = {
-        "body": of_body,
-        "metrics": of_metrics,
-        "sensors": of_sensor,
-        "radio": of_radio,
-        "topology": of_topology,
-    }
     # A stand-in knows other numbers than the part that is missing, so only the numbers of both are
     # checked.
-    for section, more in errors_of.items():
-        errors += more
-        if more and section == "topology":
-            document = {**document, section: {}}
-        elif more:
-            document = without_unknown_numbers(document, section, parts.records[section])
-    return parts, document, errors
+    for section in missing:
+        document = without_unknown_numbers(document, section, parts.records[section])
+    return parts, document
 
 
 def _law(
-    document: Mapping[str, Any], given: CallerParts, folder: Path | None, trust: bool
-) -> tuple[Model | None, list[str]]:
-    """Find the law, and add drag descent for a section [aero]; return it with the errors."""
-    table, errors = model_table(document)
-    law = given.law
-    if law is None and not errors:
-        try:
+    document: Mapping[str, Any], given: CallerParts, folder: Path | None, errors: ErrorCollector, trust: bool
+) -> Model | None:
+    """Find the law, and add drag descent for a section [aero]; None where it is missing."""
+    table, law = document.get("model", {}), given.law
+    if not isinstance(table, Mapping):
+        errors.add(f"model = {table!r} is not a table; write model.kind = {table!r}")
+    elif law is None:
+        with errors.collecting():
             law = find_law(table.get("kind"), folder, trust=trust)
-        except AirflockError as error:
-            errors += str(error).splitlines()
     if law is None or "aero" not in document:
-        return law, errors
+        return law
     # The section [aero] alone adds drag descent: no preset needs a second law for it.
     more = drag_descent_errors(law)
-    return law if more else with_drag_descent(law), errors + more
+    errors.add(*more)
+    return law if more else with_drag_descent(law)

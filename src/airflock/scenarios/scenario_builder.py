@@ -10,9 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.core import Model, telling_digits
+from airflock.core import Model, declarations, telling_digits
 from airflock.parts import SETS, TOPOLOGIES
-from airflock.scenarios import formats, schema, short_keys
+from airflock.scenarios import formats, schema
 from airflock.scenarios.fault_entries import read_fault_entries
 from airflock.scenarios.flight_world import scene_errors, scene_notes
 from airflock.scenarios.groups import GroupLawReader, group_errors, group_number_errors, read_groups
@@ -42,14 +42,11 @@ from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.scenarios.settings import (
     TOP_LEVEL_KEYS,
     apply_settings,
+    expand_short_keys,
     settings_dict,
-    with_fault_keys,
-    with_group_keys,
     with_kinds,
-    with_vector_components,
 )
-from airflock.scenarios.units import convert_units
-from airflock.support import ParameterError, ScenarioError, is_file
+from airflock.support import ErrorCollector, ParameterError, ScenarioError, is_file
 
 
 def build_scenario(
@@ -59,8 +56,7 @@ def build_scenario(
     *,
     folder: Path | None = None,
     caller_parts: CallerParts = NO_CALLER_PARTS,
-    notes: tuple[str, ...] = (),
-    known_errors: tuple[str, ...] = (),
+    errors: ErrorCollector | None = None,
     trust: bool = False,
     started: bool = False,
 ) -> Scenario:
@@ -71,7 +67,7 @@ def build_scenario(
     where : name of the scenario, at the beginning of each error
     folder : of the scenario file, where its files are looked for
     caller_parts : rules that fly in place of those that the document names
-    notes, known_errors : notes and errors from the reading of the file
+    errors : errors and notes from the reading of the file
     trust : True if code that the document names may run
     started : True if the flight is in the air, so that its start is not checked
 
@@ -82,27 +78,24 @@ def build_scenario(
     """
     # Errors are collected from here to the end of all checks: a person sees all of them at once,
     # and not one a run.
+    errors = ErrorCollector() if errors is None else errors
     settings = settings_dict(settings, where)
-    document, settings, errors = with_group_keys(formats.to_current_format(document, where), settings)
-    document, settings, wrong = with_fault_keys(document, settings)
-    errors += wrong
     # Last words are expanded only after the parts are known, since the parts decide which sections
     # have the word.
     short = {key: value for key, value in settings.items() if "." not in key and key not in TOP_LEVEL_KEYS}
-    document, left_out = with_kinds(document, settings)
-    whole, unknown = apply_settings(document, {key: value for key, value in settings.items() if key not in short})
-    flown, whole, more = collect_parts(whole, caller_parts, folder, trust=trust)
-    errors = [*known_errors, *unknown, *errors, *more]
+    document = with_kinds(formats.to_current_format(document, where), settings, errors)
+    whole = apply_settings(document, {key: value for key, value in settings.items() if key not in short}, errors)
+    flown, whole = collect_parts(whole, caller_parts, folder, errors, trust=trust)
     records = ({"model": flown.law.Parameters} if flown.law else {}) | flown.records
-    whole, key_notes, more = _in_si_units(whole, settings, short, records)
-    errors += more
-    parts, more = _parts(whole, flown)
-    errors += more + _errors_between(parts, flown, started)
-    individuals, individual_notes, more = _read_groups_and_faults(whole, parts, flown, caller_parts, folder, trust)
-    published, wrong = _published(whole.get("published", {}))
-    errors += more + wrong
-    if errors or flown.law is None:
-        raise ScenarioError([f"{where}: {error}" for error in errors])
+    named = expand_short_keys(short, records, errors, TOP_LEVEL_KEYS)
+    errors.add(*(f"{key} is given twice, once by its last word" for key in named if key in settings))
+    whole = apply_settings(whole, named, errors)
+    parts = _read_sections(whole, flown, records, errors)
+    errors.add(*_errors_between(parts, flown, started))
+    individuals = _read_groups_and_faults(whole, parts, flown, caller_parts, folder, errors, trust)
+    published = _published(whole.get("published", {}), errors)
+    errors.raise_errors(where)
+    assert flown.law is not None, "a missing law is an error"
     parts["scene"] = _find_mesh(parts["scene"], folder)
     rules = {"body": flown.body, "sensors": flown.sensors, "radio": flown.radio, "metrics": flown.metrics}
     rules["topology"] = flown.topology or TOPOLOGIES[parts["topology"].kind]
@@ -112,33 +105,33 @@ def build_scenario(
     )
     # These checks need a whole scenario, so they come second and never beside errors of single
     # keys.
-    if errors := _derived_errors(scenario) or scene_errors(scenario, started):
-        raise ScenarioError([f"{where}: {error}" for error in errors])
-    notes = (
-        *notes,
-        *left_out,
-        *key_notes,
-        *individual_notes,
-        *setting_notes(scenario),
-        *dubious_setting_notes(scenario),
-        *scene_notes(scenario),
-    )
-    return replace(scenario, notes=notes)
+    errors.add(*(_derived_errors(scenario) or scene_errors(scenario, started)))
+    errors.raise_errors(where)
+    more = (*setting_notes(scenario), *dubious_setting_notes(scenario), *scene_notes(scenario))
+    return replace(scenario, notes=(*errors.notes, *more))
 
 
 MOST_CORNERS = 10_000  # of all polygons of a world: each is looked at in each decision
 
 
-def _in_si_units(
-    document: dict[str, Any], settings: Mapping[str, Any], short: Mapping[str, Any], records: Mapping[str, type]
-) -> tuple[dict[str, Any], list[str], list[str]]:
-    """Expand last words to whole keys and vectors to components, convert to SI units; return notes and errors, too."""
-    named, notes, errors = short_keys.expand_short_keys(short, records, TOP_LEVEL_KEYS)
-    errors += [f"{key} is given twice, once by its last word" for key in named if key in settings]
-    document, more = with_vector_components(apply_settings(document, named)[0], records)
-    errors += more
-    document, converted, more = convert_units(document, {"": Flight, **records})
-    return document, [*notes, *converted], errors + more
+def _read_sections(
+    document: dict[str, Any], flown: ScenarioParts, records: Mapping[str, type], errors: ErrorCollector
+) -> dict[str, Any]:
+    """Make the records of a scenario by field, None where one has an error; the document gets declared units."""
+    kinds = {kind.section: kind for kind in PART_KINDS if kind is not SETS}
+    top = {name: document[name] for name, _, _ in declarations(Flight) if name in document}
+    parts: dict[str, Any] = {}
+    parts["flight"], top = schema.read_section("", top, Flight, errors)
+    document |= top
+    for section, record in records.items():
+        judged = ("kind",) if section == "model" or (section in kinds and not hasattr(record, "kind")) else ()
+        made, table = schema.read_section(
+            section, document.get(section, {}), record, errors, judged=judged, kinds=kinds.get(section)
+        )
+        parts["parameters" if section == "model" else section] = made
+        if section in document:
+            document[section] = table
+    return parts
 
 
 def _derived_errors(scenario: Scenario) -> list[str]:
@@ -157,12 +150,13 @@ def _read_groups_and_faults(
     flown: ScenarioParts,
     given: CallerParts,
     folder: Path | None,
+    errors: ErrorCollector,
     trust: bool,
-) -> tuple[dict[str, Any], list[str], list[str]]:
-    """Read the groups and faults of a scenario; return them with notes and errors."""
+) -> dict[str, Any]:
+    """Read the groups and faults of a scenario."""
     flight, law = parts["flight"], flown.law
     if not {"groups", "faults"} & set(document) or flight is None:
-        return {}, [], []
+        return {}
     records = {"body": flown.body.Parameters, "sensors": flown.sensors.Parameters}
     named = None
     if law is not None:
@@ -172,14 +166,16 @@ def _read_groups_and_faults(
         walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
         named = GroupLawReader(law, kind, parts["parameters"], given.laws, folder, trust, walls)
     count = int(flight.agents)
-    flocks, notes, errors = read_groups(document.get("groups", ()), count, records, named)
-    errors += group_number_errors(flocks, law)
-    if law is not None and not errors:
-        errors += group_errors(flocks, parts, law, flown.body, flown.sensors)
-    entries, fault_notes, more = read_fault_entries(
-        document.get("faults", ()), flight, flocks, folder, user_kinds=given.fault_kinds, trust=trust
+    of_groups = ErrorCollector()
+    flocks = read_groups(document.get("groups", ()), count, records, of_groups, named)
+    of_groups.add(*group_number_errors(flocks, law))
+    if law is not None and not of_groups:
+        of_groups.add(*group_errors(flocks, parts, law, flown.body, flown.sensors))
+    errors.merge(of_groups)
+    entries = read_fault_entries(
+        document.get("faults", ()), flight, flocks, errors, folder, user_kinds=given.fault_kinds, trust=trust
     )
-    return {"groups": flocks, "faults": entries}, notes + fault_notes, errors + more
+    return {"groups": flocks, "faults": entries}
 
 
 def _find_mesh(scene: Any, folder: Path | None) -> Any:
@@ -187,28 +183,6 @@ def _find_mesh(scene: Any, folder: Path | None) -> Any:
     if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
         return scene
     return replace(scene, file=str(folder / scene.file))
-
-
-def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str, Any], list[str]]:
-    """Make the records of a scenario by section, None where one has an error; and all errors."""
-    parts: dict[str, Any] = {}
-    errors: list[str] = []
-    kinds = {family.section: family.records for family in PART_KINDS if family is not SETS}
-    for section, record in flown.records.items():
-        given = document.get(section, {})
-        if section in kinds and isinstance(given, Mapping) and not hasattr(record, "kind"):
-            given = {key: value for key, value in given.items() if key != "kind"}
-        parts[section], more = schema.read_section(section, given, record, kinds=kinds.get(section))
-        errors += more
-    top: dict[str, Any] = {key: document[key] for key in ("agents", "duration", "dt", "update") if key in document}
-    parts["flight"], more = schema.read_section("", top, Flight)
-    errors += more
-    table = document.get("model", {})
-    if flown.law is not None and isinstance(table, Mapping):
-        keys = {key: value for key, value in table.items() if key != "kind"}
-        parts["parameters"], more = schema.read_section("model", keys, flown.law.Parameters)
-        errors += more
-    return parts, errors
 
 
 def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
@@ -243,12 +217,12 @@ def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: boo
     return errors + body_errors(flown.body, parts, law, started) + sensor_errors(flown.sensors, parts)
 
 
-def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[str]]:
-    """Read a paper's numbers by name, each a mean with or without standard deviation; and errors."""
-    if not isinstance(table, Mapping):
-        return {}, [f"published = {table!r} is not a table of order parameters"]
+def _published(table: Any, errors: ErrorCollector) -> dict[str, tuple[float, float | None]]:
+    """Read a paper's numbers by name, each a mean with or without standard deviation."""
     published: dict[str, tuple[float, float | None]] = {}
-    errors: list[str] = []
+    if not isinstance(table, Mapping):
+        errors.add(f"published = {table!r} is not a table of order parameters")
+        return published
     for key, entry in table.items():
         if isinstance(entry, Mapping) and set(entry) <= {"mean", "sd"}:
             numbers = [entry.get("mean"), *([entry["sd"]] if "sd" in entry else [])]
@@ -257,8 +231,8 @@ def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[
         if 1 <= len(numbers) <= 2 and all(map(_finite, numbers)):
             published[key] = (float(numbers[0]), float(numbers[1]) if len(numbers) == 2 else None)
         else:
-            errors.append(f"published.{key} = {entry!r}: give a number, [mean, sd], or {{ mean = ..., sd = ... }}")
-    return published, errors
+            errors.add(f"published.{key} = {entry!r}: give a number, [mean, sd], or {{ mean = ..., sd = ... }}")
+    return published
 
 
 def _finite(value: Any) -> bool:

@@ -1,21 +1,23 @@
 """Settings: keys that a caller sets from outside, applied to a document before it is checked.
 
 A key is whole ("radio.delay"), or names a number of a group (`groups.NAME.SECTION.KEY`, a tolerance
-with `.spread` behind it) or of a fault (`faults.KIND.KEY` or `faults.NUMBER.KEY`). Keys by their
-last word: `short_keys`.
+with `.spread` behind it) or of a fault (`faults.KIND.KEY` or `faults.NUMBER.KEY`). `delay` stands
+for `radio.delay` where only one section has a delay.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from airflock.core import Declaration, declarations, expand_vectors, without_replaced
+from airflock.core import Declaration, Quantity, declarations, without_replaced
+from airflock.parts import LAWS
 from airflock.scenarios.groups import LETTERS
 from airflock.scenarios.part_kinds import PART_KINDS, kept_keys, named_kind
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
-from airflock.support import ScenarioError, suggest, to_identifier
+from airflock.support import ErrorCollector, ScenarioError, suggest, to_identifier
 
 TOP_LEVEL_KEYS = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
 
@@ -23,34 +25,30 @@ TOP_LEVEL_KEYS = ("model", *SECTIONS, "groups", "faults", "agents", "duration", 
 STEERED = {"speed_max": "speed", "speed": "speed", "turn": "turn"}  # number of a body → number of [steer]
 
 
-def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """Return a document without the numbers of each part for which settings name another kind, and notes on it.
+def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any], errors: ErrorCollector) -> Mapping[str, Any]:
+    """Return a document without the numbers of each part for which settings name another kind, which is noted.
 
     The published values of a law go with its numbers.
     """
-    notes: list[str] = []
-    for family in PART_KINDS:
-        section = family.section
-        table, key = document.get(section, {}), f"{section}.kind"
+    document = {**document}
+    for family in (*PART_KINDS, LAWS):
+        section, key = family.section, f"{family.section}.kind"
+        table = document.get(section, {})
         if key not in settings or not isinstance(table, Mapping):
             continue
-        kept = kept_keys(family, table, str(settings[key]))
+        before = value_of(table.get("kind")) if family is LAWS else named_kind(family, document)
+        if family is LAWS and before in (None, settings[key]):
+            continue
+        kept = {} if family is LAWS else kept_keys(family, table, str(settings[key]))
         if set(table) - {"kind", *kept}:
-            before = named_kind(family, document)
-            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {before} are left out")
-        document = {**document, section: kept}
+            errors.notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {before} are left out")
+        document |= {section: kept} | ({"published": {}} if family is LAWS else {})
         # How fast a body flew and turned by itself is how a law's command is converted for another one.
         gone = set(table) - set(kept) if section == "body" else set()
         moved = {name: table[own] for own, name in STEERED.items() if own in gone}
         if moved and isinstance(document.get("steer", {}), Mapping):
             document["steer"] = moved | document.get("steer", {})
-    law = document.get("model", {})
-    before = value_of(law.get("kind")) if isinstance(law, Mapping) else None
-    if "model.kind" in settings and before not in (None, settings["model.kind"]):
-        if set(law) - {"kind"}:
-            notes.append(f"model.kind = {settings['model.kind']!r}: the numbers of the file's {before} are left out")
-        document = {**document, "model": {}, "published": {}}
-    return document, tuple(notes)
+    return document
 
 
 def settings_dict(settings: Any, where: str) -> dict[str, Any]:
@@ -73,19 +71,29 @@ def _plain(value: Any) -> Any:
     return type(value)(map(_plain, value)) if type(value) in (list, tuple) else value
 
 
-def apply_settings(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """Return a copy of a document with keys like "model.p_rep" set, and errors for unknown keys."""
+def apply_settings(document: Mapping[str, Any], settings: Mapping[str, Any], errors: ErrorCollector) -> dict[str, Any]:
+    """Return a copy of a document with keys set: whole ones such as "model.p_rep", and those of groups and faults."""
     result: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
-    errors: list[str] = []
-    for key, value in settings.items():
+    # Keys of entries come last: whole lists of them may be set, too.
+    for key, value in sorted(settings.items(), key=lambda item: is_group_key(item[0]) or is_fault_key(item[0])):
         section, _, name = key.partition(".")
-        if name and not isinstance(result.setdefault(section, {}), dict):
-            errors.append(f"{key}: unknown key")
-        elif name:
+        if is_group_key(key) or is_fault_key(key):
+            entries = _entries(result, section)
+            if not entries:
+                errors.add(f"{key}: the scenario has no [[{section}]]; write them in a file")
+                continue
+            result[section] = entries
+            of_group = section == "groups"
+            error = _set_of_group(key, value, entries, document) if of_group else _set_of_fault(key, value, entries)
+            errors.add(*([f"{key}: {error}"] if error else []))
+        elif not name:
+            result[section] = value
+        elif isinstance(result.setdefault(section, {}), dict):
             result[section] = {**without_replaced(result[section], {name: value}), name: value}
         else:
-            result[section] = value
-    return result, errors + [_unknown(key, value) for key, value in result.items() if key not in TOP_LEVEL_KEYS]
+            errors.add(f"{key}: unknown key")
+    errors.add(*(_unknown(key, value) for key, value in result.items() if key not in TOP_LEVEL_KEYS))
+    return result
 
 
 def _unknown(key: str, value: object) -> str:
@@ -96,14 +104,73 @@ def _unknown(key: str, value: object) -> str:
     return f"{key}: unknown key; {suggest(key, TOP_LEVEL_KEYS, 'known: ' + ', '.join(TOP_LEVEL_KEYS))}"
 
 
-def with_vector_components(document: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
-    """Return a document in which each vector is its components, and the errors of vectors that are given whole."""
-    errors: list[str] = []
+def _entries(document: Mapping[str, Any], section: str) -> list[dict[str, Any]]:
+    """Return copies of the entries of a list of tables; none where it is no such list."""
+    entries = document.get(section, ())
+    tables = isinstance(entries, (list, tuple)) and all(isinstance(table, Mapping) for table in entries)
+    return [dict(table) for table in entries] if tables else []
+
+
+# keys that only files have: what to do instead
+IN_FILES = {
+    "extends": "only a file has it; name the preset or file that it extends in place of this one",
+    "format": "only a file has it; leave it out",
+}
+
+
+def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
+    """Return last word → whole keys of all sections that have it.
+
+    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives
+    way to a key of the model with the same name.
+    """
+    keys: dict[str, list[str]] = {}
     for section, record in records.items():
-        if isinstance(table := document.get(section), Mapping) and getattr(record, "VECTORS", None):
-            document[section], more = expand_vectors(section, table, record)
-            errors += more
-    return document, errors
+        for name, declared, _ in declarations(record):
+            # `delay` alone was the radio's before bodies had one, and stays it.
+            if section and (section, name) != ("body", "delay"):
+                # Optional numbers of metrics default to the scenario's own; without this rule
+                # `v_flock` would be ambiguous in every law that has it.
+                derived = section == "metrics" and isinstance(declared, Quantity) and declared.optional
+                if not (derived and name in keys):
+                    keys.setdefault(name, []).append(f"{section}.{name}")
+        for name in getattr(record, "VECTORS", {}):
+            keys.setdefault(name, []).append(f"{section}.{name}")
+    return keys
+
+
+def expand_short_keys(
+    settings: Mapping[str, Any], records: Mapping[str, type], errors: ErrorCollector, top: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Expand settings by their last words to whole keys; ambiguous and unknown ones are errors.
+
+    settings : keys that are neither whole ("radio.delay") nor at the top of a file ("agents")
+    records  : section → record of its parameters, "model" first
+    """
+    known = keys_by_last_word(records)
+    result: dict[str, Any] = {}
+    for key, value in settings.items():
+        where = known.get(key, [])
+        if len(where) == 1:
+            result[where[0]] = value
+            errors.notes.append(f"{key} is read as {where[0]}")
+        elif where:
+            meant = (f"{name} ({_meaning(name, records)})" for name in where)
+            errors.add(f"{key} is several keys; write {' or '.join(meant)}")
+        elif key in IN_FILES:
+            errors.add(f"{key}: {IN_FILES[key]}")
+        else:
+            near = get_close_matches(key, (*top, *known), n=1, cutoff=0.5)
+            full = known.get(near[0], near) if near else []
+            errors.add(f"{key}: unknown key; {f'did you mean {full[0]}?' if near else 'known: ' + ', '.join(top)}")
+    return result
+
+
+def _meaning(key: str, records: Mapping[str, type]) -> str:
+    """Return the meaning of a whole key, up to the first comma or semicolon."""
+    section, _, last = key.partition(".")
+    declared = next(found for name, found, _ in declarations(records[section]) if name in (last, f"{last}_0"))
+    return re.split(r"[;,(]", declared.meaning)[0].strip()
 
 
 GROUP_PREFIX, SPREAD = "groups.", "spread"
@@ -123,50 +190,23 @@ def split_key(key: str) -> tuple[str, str, str]:
     return (".".join(rest[:-2]), rest[-2], rest[-1]) if len(rest) > 2 else ("", "", "")
 
 
-def with_group_keys(
-    document: Mapping[str, Any], settings: Mapping[str, Any]
-) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
-    """Set the keys of groups in a document; return it, the other settings, and the errors of these keys."""
-    group_settings = {key: value for key, value in settings.items() if is_group_key(key)}
-    others = {key: value for key, value in settings.items() if key not in group_settings}
-    entries = others.get("groups", document.get("groups", ()))
-    if (
-        not group_settings
-        or not entries
-        or not isinstance(entries, (list, tuple))
-        or not all(isinstance(table, Mapping) for table in entries)
-    ):
-        return (
-            document,
-            others,
-            [f"{key}: the scenario has no [[groups]]; write them in a file" for key in group_settings],
-        )
-    tables = [dict(table) for table in entries]
+def _set_of_group(key: str, value: Any, tables: list[dict[str, Any]], document: Mapping[str, Any]) -> str:
+    """Set a key of a group in the entries of [[groups]]; return what is wrong with the key."""
     names = [table.get("name", f"group_{number}") for number, table in enumerate(tables)]
-    errors = []
-    for key, value in group_settings.items():
-        # Names of groups may hold dots, so a key is split from its end.
-        group, section, name = split_key(key)
-        if section not in LETTERS and _belongs_to_file(key, names):
-            errors.append(
-                f"{key}: a setting changes only {', '.join(LETTERS)} of a group; write it in the file's [[groups]]"
-            )
-        elif section not in LETTERS or not name:
-            hint = _group_key_hint(key, document, dict(zip(map(str, names), tables, strict=True)))
-            errors.append(f"{key}: unknown key; {hint}")
-        elif group not in names:
-            hint = suggest(group, [str(known) for known in names], f"known: {', '.join(map(str, names))}")
-            errors.append(f"{key}: unknown group {group!r}; {hint}")
-        else:
-            table = tables[names.index(group)]
-            own, (name, _, spread) = table.get(section, {}), name.partition(".")
-            if isinstance(own, Mapping):
-                before = own.get(name)
-                table[section] = {
-                    **own,
-                    name: _with_spread(before, value) if spread else with_old_spread(before, value),
-                }
-    return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, errors
+    # Names of groups may hold dots, so a key is split from its end.
+    group, section, name = split_key(key)
+    if section not in LETTERS and _belongs_to_file(key, names):
+        return f"a setting changes only {', '.join(LETTERS)} of a group; write it in the file's [[groups]]"
+    if section not in LETTERS or not name:
+        return f"unknown key; {_group_key_hint(key, document, dict(zip(map(str, names), tables, strict=True)))}"
+    if group not in names:
+        return f"unknown group {group!r}; " + suggest(group, map(str, names), f"known: {', '.join(map(str, names))}")
+    table = tables[names.index(group)]
+    own, (name, _, spread) = table.get(section, {}), name.partition(".")
+    if isinstance(own, Mapping):
+        before = own.get(name)
+        table[section] = {**own, name: _with_spread(before, value) if spread else with_old_spread(before, value)}
+    return ""
 
 
 def _belongs_to_file(key: str, names: list[str]) -> bool:
@@ -238,38 +278,18 @@ FAULT_PREFIX = "faults."
 FAULT_FORM = "write faults.KIND.KEY or faults.NUMBER.KEY, for instance faults.motor.share"
 
 
-def with_fault_keys(
-    document: Mapping[str, Any], settings: Mapping[str, Any]
-) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
-    """Set the keys of faults in a document; return it, the other settings, and the errors of these keys."""
-    fault_settings = {key: value for key, value in settings.items() if key.startswith(FAULT_PREFIX)}
-    others = {key: value for key, value in settings.items() if key not in fault_settings}
-    if not fault_settings:
-        return document, others, []
-    entries = others.get("faults", document.get("faults", ()))
-    if (
-        not entries
-        or not isinstance(entries, (list, tuple))
-        or not all(isinstance(table, Mapping) for table in entries)
-    ):
-        return (
-            document,
-            others,
-            [f"{key}: the scenario has no [[faults]]; write them in a file" for key in fault_settings],
-        )
-    tables = [dict(table) for table in entries]
-    errors = []
-    for key, value in fault_settings.items():
-        entry, _, name = key.removeprefix(FAULT_PREFIX).rpartition(".")
-        number, error = _find_entry(entry, name, tables)
-        if number is None:
-            errors.append(f"{key}: {error}")
-        # None resets the number to its default, for sliders and sweeps that return to the start.
-        elif value is None:  # as it is without
-            tables[number].pop(name, None)
-        else:
-            tables[number][name] = value
-    return {**document, "faults": tables}, {key: v for key, v in others.items() if key != "faults"}, errors
+def _set_of_fault(key: str, value: Any, tables: list[dict[str, Any]]) -> str:
+    """Set a key of a fault in the entries of [[faults]]; return what is wrong with the key."""
+    entry, _, name = key.removeprefix(FAULT_PREFIX).rpartition(".")
+    number, error = _find_entry(entry, name, tables)
+    if number is None:
+        return error
+    # None resets the number to its default, for sliders and sweeps that return to the start.
+    if value is None:
+        tables[number].pop(name, None)
+    else:
+        tables[number][name] = value
+    return ""
 
 
 def is_fault_key(key: str) -> bool:

@@ -10,7 +10,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.core import Declaration, Points, Quantity, declarations, format_with_unit
+from airflock.core import Declaration, Points, Quantity, format_with_unit
+from airflock.support import ErrorCollector, is_number
 
 DEGREE = math.pi / 180.0
 FOOT, MILE, NAUTICAL_MILE = 0.3048, 1609.344, 1852.0
@@ -67,69 +68,28 @@ def unit_names(declared: str) -> set[str]:
     return spelt | {name for name, unit in SPELLINGS.items() if unit in units}
 
 
-def convert_units(
-    document: Mapping[str, Any], records: Mapping[str, type]
-) -> tuple[dict[str, Any], list[str], list[str]]:
-    """Convert a document to declared units.
+def converted(name: str, entry: Any, declared: Declaration) -> tuple[Any, str, str]:
+    """Convert one value to its declared unit; return it, as text or in a table as it was, with a note and an error.
 
-    Parameters
-    ----------
-    document : nested dict of a scenario
-    records : section → record of its parameters, "" for the keys at the top
-
-    Returns
-    -------
-    The document, notes on what was converted, and errors for units that do not fit. A key with a wrong unit is
-    left out of the document, so that it is reported once.
+    The error is of a unit that does not fit, or of text without one; what else is wrong is left as it is.
     """
-    notes: list[str] = []
-    errors: list[str] = []
-    result = dict(document)
-    for section, record in records.items():
-        known = {name: declared for name, declared, _ in declarations(record)}
-        values = document if not section else document.get(section)
-        if not isinstance(values, Mapping):
-            continue
-        # Every conversion is reported in a note: a wrong unit that passes in silence is worse than
-        # a refusal.
-        changed = {}
-        for key in (key for key in values if key in known):  # in the order of the file, so that notes are
-            name = f"{section}.{key}".lstrip(".")
-            changed[key], note, error = _converted(name, values[key], known[key])
-            notes += [note] if note else []
-            errors += [error] if error else []
-        # A value with a wrong unit must not reach the check of its section, or it would be reported
-        # twice.
-        wrong = {key for key in changed if changed[key] is None}
-        table = {key: changed.get(key, value) for key, value in values.items() if key not in wrong}
-        if section:
-            result[section] = table
-        else:
-            result = table | {key: value for key, value in result.items() if key not in known}
-    return result, notes, errors
-
-
-def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, str]:
-    """Convert one value; return it with a note and an error. The value is None where its unit does not fit the key."""
     if not isinstance(declared, (Quantity, Points)):
-        return given, "", ""
-    long = isinstance(given, Mapping) and "value" in given
-    value, unit = (given["value"], given.get("unit", "")) if long else (given, "")
-    written = f"{value} {unit}".strip() if long else given
+        return entry, "", ""
+    long = isinstance(entry, Mapping) and "value" in entry
+    value, unit = (entry["value"], entry.get("unit", "")) if long else (entry, "")
+    written = f"{value} {unit}".strip() if long else entry
     if isinstance(value, str) and not unit:
         match = NUMBER_WITH_UNIT.fullmatch(value)
         if match is None:
-            return given, "", ""  # no number at all: the check of the section reports it with the allowed range
+            return entry, "", ""  # no number at all: the declaration reports it with the allowed range
         if not match[2]:
             return None, "", f"{name} = {value!r} {_missing_unit(match[1], declared)}"
         # The pattern reads "0,5 s" as 0 with the unit ",5 s"; name the comma and not the unit.
         if DECIMAL_COMMA.match(match[2]):
             return None, "", f"{name} = {value}: has a decimal comma; write {match[1]}.{match[2][1:]}"
         value, unit = float(match[1]), match[2]
-    if not isinstance(unit, str) or unit in ("", declared.unit):
-        if unit and isinstance(unit, str) and unit == declared.unit:
-            return ({**given, "value": value, "unit": unit} if long else value), "", ""
-        return given, "", ""
+    if unit == "" or not isinstance(unit, str):
+        return entry, "", ""
     times = conversion_factor(unit, declared.unit)
     if times is None:
         others = _other_units(declared.unit)
@@ -138,12 +98,13 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
         return None, "", f"{name} = {written}: the unit is {declared.unit}{f', or one of {others}' if others else ''}"
     scaled = _scaled(value, times)
     if scaled is None:
-        return given, "", ""
-    note = f"{name} = {_short(value)} {unit} is {format_with_unit(_short(scaled), declared.unit)}"
-    # The note leaves out the numbers of a list: a polygon may have 100,000 corners.
-    if isinstance(scaled, list):
-        note = f"{name} was converted from {unit} to {declared.unit}"
-    return ({**given, "value": scaled, "unit": declared.unit} if long else scaled), note, ""
+        return entry, "", ""
+    result = {**entry, "value": scaled, "unit": declared.unit} if long else scaled
+    if unit == declared.unit:
+        return result, "", ""
+    if isinstance(scaled, list):  # the note leaves out its numbers: a polygon may have 100,000 corners
+        return result, f"{name} was converted from {unit} to {declared.unit}", ""
+    return result, f"{name} = {_short(value)} {unit} is {format_with_unit(_short(scaled), declared.unit)}", ""
 
 
 def _other_units(declared: str) -> str:
@@ -211,36 +172,29 @@ def standard_deviation(spread: float, value: float) -> float:
     return spread * abs(value) if isinstance(spread, RelativeSpread) else spread
 
 
-def relative_spread(entry: Any, declared: Any) -> RelativeSpread | None:
-    """Parse a spread as a share of its number; None for a number that is a share itself, of which "10 %" is 0.1."""
-    relative = isinstance(declared, Quantity) and declared.unit not in ("", "1")
-    return RelativeSpread.parse(entry) if relative else None
-
-
-def with_share_hint(line: str, spread_prefix: str, known: Mapping[str, Any]) -> str:
-    """Return the end of an error line about the unit of a spread, which may be a share as well; "" where it may not."""
-    key = line.removeprefix(f"{spread_prefix}.").partition(" ")[0]
-    declared = known.get(key) if line.startswith(f"{spread_prefix}.") else None
+def share_hint(declared: Any) -> str:
+    """Return the end of an error line about a spread, which may be a share as well; "" where it may not."""
     return f", or {OF_IT}" if isinstance(declared, Quantity) and declared.unit not in ("", "1") else ""
 
 
-def check_spreads(where: str, table: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
-    """Return standard deviations in declared units, and the errors of those that are none."""
-    spreads, errors = {}, []
-    for key, entry in table.items():
-        value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
-        declared = known.get(key)
-        if not isinstance(declared, Quantity):
-            errors.append(f"{where}.{key}: unknown number")
-        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
-            other = with_share_hint(f"{where}.spread.{key}", f"{where}.spread", known)
-            least = format_with_unit("0", declared.unit)
-            errors.append(
-                f"{where}.{key}.spread = {_as_text(value)} is not a standard deviation of {least} or more{other}"
-            )
-        else:
-            spreads[key] = value if isinstance(value, RelativeSpread) else float(value)
-    return spreads, errors
+def read_spread(name: str, entry: Any, unit: str, declared: Quantity, errors: ErrorCollector) -> float | None:
+    """Return a standard deviation in the declared unit, or as a share of its number; None where it is neither.
+
+    name : of the spread, for its errors; unit : of the number that it stands beside, "" for none
+    """
+    share: Any = RelativeSpread.parse(entry) if share_hint(declared) else None
+    if share is None:
+        entry, note, error = converted(name, {"value": entry, "unit": unit} if unit else entry, declared)
+        if error:
+            errors.add(f"{error}{share_hint(declared)}")
+            return None
+        errors.notes += [note] if note else []
+        share = entry.get("value", entry) if isinstance(entry, Mapping) else entry
+    if not is_number(share) or not 0.0 <= share < math.inf:
+        least = f"{format_with_unit('0', declared.unit)} or more{share_hint(declared)}"
+        errors.add(f"{name} = {_as_text(share)} is not a standard deviation of {least}")
+        return None
+    return share if isinstance(share, RelativeSpread) else float(share)
 
 
 def _as_text(spread: Any) -> str:

@@ -27,6 +27,7 @@ from airflock.search.objectives import Objective, read_limits, read_objectives
 from airflock.search.search_settings import CONSTANT_SEEDS_SHARE, SEED_BITS, SearchSettings, search_errors
 from airflock.search.study_space import default_space, read_space
 from airflock.support import (
+    ErrorCollector,
     ScenarioError,
     StudyError,
     TextError,
@@ -261,14 +262,14 @@ def make_study(
     document, errors = formats.to_current_format(document, where), []
     for key in document:
         if key not in KEYS:
-            of_search = key in {field.name for field in fields(SearchSettings)}
-            hint = f"did you mean search.{key}?" if of_search else suggest(key, KEYS, f"known: {', '.join(KEYS)}")
+            of_settings = key in {field.name for field in fields(SearchSettings)}
+            hint = f"did you mean search.{key}?" if of_settings else suggest(key, KEYS, f"known: {', '.join(KEYS)}")
             errors.append(f"{key}: unknown key; {hint}")
     table = document.get("search", {})
-    found, more = schema.read_section(
-        "search", {**table, **(search or {})} if isinstance(table, Mapping) else table, SearchSettings
-    )
-    errors += more
+    of_search = ErrorCollector()
+    table = {**table, **(search or {})} if isinstance(table, Mapping) else table
+    found, _ = schema.read_section("search", table, SearchSettings, of_search)
+    errors += of_search.errors
     if scenario is None:
         scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
         if more or not scenarios:
@@ -297,7 +298,7 @@ def make_study(
     if errors or space is None or found is None:
         raise ScenarioError([f"{where}: {error}" for error in errors])
     return Study(
-        scenarios[0], space, objectives, found, str(document.get("title", "")), notes=tuple(notes),
+        scenarios[0], space, objectives, found, str(document.get("title", "")), notes=(*notes, *of_search.notes),
         others=scenarios[1:], over_scenarios=str(over), labels=labels, limits=kept,
     )  # fmt: skip
 

@@ -46,6 +46,7 @@ from airflock.studio.player import Player
 from airflock.support import (
     MAX_BYTES,
     AirflockError,
+    ErrorCollector,
     FormatError,
     ScenarioError,
     StudioError,
@@ -731,9 +732,9 @@ def parse_setting(text: str, scenario: Scenario) -> tuple[str, Any]:
     if key in TOP_LEVEL_KEYS:
         raise ScenarioError([f"{key}: cannot be changed while a flock flies; write it into the scenario file"])
     records = {section: type(record) for section, record in scenario.records.items()}
-    whole, _, faults = expand_short_keys({key: found}, records, ())
-    if faults:
-        raise ScenarioError(faults)
+    errors = ErrorCollector()
+    whole = expand_short_keys({key: found}, records, errors)
+    errors.raise_errors()
     return next(iter(whole.items()))
 
 

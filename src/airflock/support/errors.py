@@ -141,24 +141,47 @@ class ErrorCollector:
     A part is left out where one that it depends on is invalid, and only there. After `raise_errors`
     has returned, every part is what its reader made.
 
-    errors : errors so far, one line each
+    notes : what was read otherwise than it was written, one line each
+
+    Examples
+    --------
+    >>> errors = ErrorCollector(["dt = -1 s lies outside [1e-06, 10] s"])
+    >>> errors.add("agents = 0 lies outside [1, 1e+07]")
+    >>> bool(errors), len(errors.errors)
+    (True, 2)
     """
 
     def __init__(self, errors: Iterable[str] = ()) -> None:
-        self.errors = list(errors)
+        # Keys of a dict: a file of a hundred thousand unknown keys is refused in linear time.
+        self._lines = dict.fromkeys(errors)
         self._raised: list[AirflockError] = []
+        self.notes: list[str] = []
+
+    @property
+    def errors(self) -> list[str]:
+        """Errors so far, one line each, in the order in which they were added."""
+        return list(self._lines)
+
+    def __bool__(self) -> bool:
+        return bool(self._lines)
 
     def read(self, reader: Callable[P, T], *parts: P.args, **named: P.kwargs) -> T:
         """Return what a reader makes of parts; INVALID, with its errors collected, where it raises an AirflockError."""
         # A reader of an invalid part would only report a consequence of an error that is collected
         # already.
         if not any(part is INVALID for part in (*parts, *named.values())):
-            try:
+            with self.collecting():
                 return reader(*parts, **named)
-            except AirflockError as error:
-                self._raised.append(error)
-                self.note(*str(error).splitlines())
         return INVALID  # type: ignore[no-any-return]
+
+    @contextmanager
+    def collecting(self, prefix: str = "") -> Iterator[None]:
+        """Collect the errors of the block, each line behind a prefix, and go on."""
+        try:
+            yield
+        except AirflockError as error:
+            self._raised.append(error)
+            self.add(*(f"{prefix}{line}" for line in str(error).splitlines()))
 
     def collect_each(self, reader: Callable[[Any], T], parts: Iterable[Any] | None) -> list[T]:
         """Read each of several parts; INVALID where one of them is."""
@@ -167,16 +190,29 @@ class ErrorCollector:
         results = [self.read(reader, part) for part in parts or ()]
         return INVALID if any(part is INVALID for part in results) else results
 
-    def note(self, *errors: str) -> None:
-        """Add errors that no reader raises."""
-        self.errors += [error for error in errors if error not in self.errors]
+    def add(self, *errors: str) -> None:
+        """Add errors that no reader raises; one that is known already is not repeated."""
+        self._lines.update(dict.fromkeys(errors))
 
-    def raise_errors(self) -> None:
-        """Raise the reader's own exception if it is the only error, or else a ScenarioError with all of them."""
+    note = add  # of an error, as requests of the command line call it
+
+    def merge(self, part: "ErrorCollector") -> bool:
+        """Add the errors and notes of a part; return True if it has errors."""
+        self.add(*part._lines)
+        self.notes += part.notes
+        return bool(part)
+
+    def raise_errors(self, where: str = "") -> None:
+        """Raise the reader's own exception if it is the only error, or else a ScenarioError with all of them.
+
+        where : of a document, named before each of its errors, which are a ScenarioError together
+        """
+        if where and self:
+            raise ScenarioError([f"{where}: {error}" for error in self._lines])
         # A single error keeps its own class, which callers catch: RecordingError, StudyError, ...
         if len(self._raised) == 1 and self.errors == str(self._raised[0]).splitlines():
             raise self._raised[0]
-        if self.errors:
+        if self:
             raise ScenarioError(self.errors)
 
 
