@@ -35,5 +35,4 @@ def script() -> None:
     assert_type(airflock.evolve(scenario, "study", generations=2).fitness, float)
     assert_type(airflock.display(["AIR"], 20).shape_reports[0].collisions, int)
     airflock.simulate(scenario, sed=7)  # type: ignore[call-arg]
-    airflock.sweep(scenario)  # type: ignore[call-arg]
     airflock.sweeep(scenario)  # type: ignore[attr-defined]

@@ -42,6 +42,6 @@ def evolve(
 
     def watch(p: RunProgress) -> None:
         if flights.progress:
-            flights.progress(title, p.done, p.total)
+            flights.progress(title, p.done, p.total or p.done)
 
     return run_study(study, place, study_executor(study, threads=flights.threads), watch)

@@ -29,11 +29,7 @@ from airflock.runs import (
     score_scenarios,
     unpublished,
 )
-<<<<<<< HEAD
-from airflock.scenarios import Scenario, check_seeds, scenario_variant, short_keys
-=======
-from airflock.scenarios import Scenario, build_scenario, check_seeds, keys_by_last_word, scenario_variant
->>>>>>> b996a4a5 (Each key of a scenario is looked up, converted and checked in one pass; one collector of errors; grids, seeds and agents are counted before they are listed)
+from airflock.scenarios import Scenario, check_seeds, keys_by_last_word, scenario_variant
 from airflock.support import (
     ScenarioError,
     StudyError,
