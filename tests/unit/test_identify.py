@@ -431,7 +431,7 @@ def test_gaps_of_a_counter_are_losses_and_distances_come_from_the_positions(seed
     found, notes = packets.lost_by_sequence(heard, aligned, comparable)
     assert "losses from gaps of seq" in notes[0] and "seq starts again" in notes[1]  # the counter ends at 4096
     # what is lost before the first and after the last packet that came, and where the counter starts again, is unknown
-    assert len(every) - 60 <= len(found) <= len(every)
+    assert 0.99 * len(every) <= len(found) <= len(every)
     assert found["got"].sum() == every["got"].sum() and found["distance"].max() < every["distance"].max() + 0.1
     for low in range(0, 130, 10):  # by distance, the same shares as were drawn
         own, truth = (t["got"][(t["distance"] >= low) & (t["distance"] < low + 10)] for t in (found, every))
@@ -442,7 +442,7 @@ def test_gaps_of_a_counter_are_losses_and_distances_come_from_the_positions(seed
 
 def test_clocks_of_their_own_are_noted_and_agreeing_ones_are_not():
     logs, came, _ = pairs_by_sequence(1, links.Parameters(kind="links"))
-    assert packets.clocks_apart(packets.fit_delay(packets.check_packets(came))) > 1.0
+    assert packets.clocks_apart(packets.fit_delay(packets.check_packets(came))) > 0.1
     agreeing = came.assign(t_tx=came["seq"] / 10.0, t_rx=came["seq"] / 10.0 + 0.05)
     assert packets.clocks_apart(packets.fit_delay(packets.check_packets(agreeing))) == 0.0
 

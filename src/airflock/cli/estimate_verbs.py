@@ -263,6 +263,8 @@ def infer(o: SimpleNamespace, errors: ErrorCollector) -> None:
     if o.json:
         return terminal.print_json(_inferred_json(result))
     terminal.print_result(result)
+    if result.best is not None and o.topologies == "metric":
+        terminal.print_message("neighbours by distance were tried; others: --topologies metric,nearest,voronoi")
     if o.out is not None and result.best is None:
         raise AirflockError(f"{o.out}: not written: {result.verdict}")
     return None

@@ -137,7 +137,8 @@ def lost_by_sequence(heard: pd.DataFrame, logs: FlightLogs, comparable: bool) ->
     for (receiver, sender), own in heard.groupby(["receiver", "sender"]):
         if str(receiver) not in number or str(sender) not in number:
             continue
-        own = own.sort_values("t").drop_duplicates("seq")
+        own = own.sort_values("stamp")  # packets may overtake each other, and come twice
+        own = own[own["seq"].diff() != 0]
         # A counter that wraps around or starts again would look like thousands of losses.
         run = (own["seq"].diff() < 0).cumsum()
         again += int(run.max())
@@ -222,9 +223,9 @@ def fit_delay(heard: pd.DataFrame) -> DelayFit:
 
 
 def clocks_apart(late: DelayFit) -> float:
-    """Return how far the clocks of the drones are apart, s; 0 if no farther than packets scatter."""
+    """Return how far the clocks of the drones are apart, s; 0 if no farther than packets scatter, or than 1 ms."""
     apart = max(late.ahead.values(), default=0.0) - min(late.ahead.values(), default=0.0)
-    return apart if not late.reason and apart > max(late.scatter, late.interval[1] - late.interval[0]) else 0.0
+    return apart if not late.reason and apart > max(late.scatter, late.interval[1] - late.interval[0], 1e-3) else 0.0
 
 
 def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:

@@ -377,10 +377,11 @@ def _radio(
     # One curve has four numbers: three of them with a default for the fourth were off by 0.07 to 0.17.
     lacking = ", ".join(f"radio.{name}" for name in links.refused)
     for name in CURVE_PARAMETERS:
-        why = links.refused.get(name, "") or (
-            f"belongs to one curve with {lacking}, which the packets do not tell" if lacking else ""
-        )
-        why = why if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
+        why = links.refused.get(name, "")
+        if not why and not lossy:
+            why = "radio.kind of --like has no such curve: --set radio.kind=links"
+        elif not why and lacking:
+            why = f"belongs to one curve with {lacking}, which the packets do not tell"
         numbers.add(f"radio.{name}", links.value[name], links.intervals[name], f"{len(sent)} packets", why)
     return links
 

@@ -22,7 +22,8 @@ STEP = 0.025  # s; longest motion step
 LONG = 1e5  # s; a flight that outlasts any span
 DECADES = 100.0  # a number whose unit says nothing of its size is sought this far from its default
 RATES = (0.01, 20.0)  # 1/s, of gains
-METRIC, OFFERED = "metric", ("metric", "nearest", "voronoi")  # neighbourhoods: by distance, and those on offer
+METRIC = "metric"  # neighbours by distance, as the law has them
+OFFERED = (METRIC, "nearest", "voronoi")
 MOST_NEIGHBOURS = 20
 QUIET = {"sensors.kind": "perfect", "wind.gust": 0.0, "radio.loss": 0.0}
 
@@ -159,7 +160,7 @@ def _by_topology(what: str | Scenario, settings: Mapping[str, Any], kind: str, t
         return _base(what, settings, trust)
     chosen = {**settings, "topology.kind": kind}
     if isinstance(what, Scenario):
-        made = build_scenario(what.document, what.name, chosen, caller_parts=CallerParts(law=what.model))
+        made = build_scenario(what.document, what.name, chosen, caller_parts=CallerParts(what.model, what.body.rule))
     else:
         made = _base(what, chosen, trust)
     return replace(made, name=f"{made.name}, {kind}")

@@ -464,6 +464,7 @@ def name_law(
 ) -> tuple[InferResult, "_Comparison"]:
     """Return the result of `infer` before its intervals and flights, and the comparison of the laws."""
     models = [models] if isinstance(models, str) else models
+    topologies = [topologies] if isinstance(topologies, str) else topologies
     if not isinstance(models, Iterable):
         raise AirflockError(f"infer: models = {models!r}: give a list of laws, such as ['couzin_2002']")
     if not models:
@@ -578,7 +579,14 @@ class _Comparison:
         """
         say = lambda _: self.say(f"{law.name}, by chance")  # noqa: E731
         null = _Comparison([shifted_in_time(each) for each in self.followed], self.scale, self.seed, say)
-        (found,) = null.of([self.laws[law.name]])
+        null.of([self.laws[law.name]])
+        # It is searched as deeply as the tracks were, and from the law found as well.
+        null.deeper(law.name)
+        for number, (half, (model, fit)) in enumerate(zip(null.halves, self.fits[law.name], strict=True)):
+            own = FitModel(model.law, null.followed, self.scale).on(half)
+            refitted = own, law_selection.polish_fit(own, fit.place)
+            null.fits[law.name][number] = min(null.fits[law.name][number], refitted, key=lambda each: each[1].loss)
+        found = null.judged(law.name)
         return found.gain, found.error
 
     def finish(self, law: LawResult) -> FitModel:

@@ -207,6 +207,11 @@ def tracks_scale(all_tracks: list[SpanTracks]) -> TrackScale:
         raise RecordingError(
             f"{all_tracks[0].name}: no two individuals are ever seen together, so nobody to flock with"
         )
+    name = all_tracks[0].name
+    if not np.quantile(speed, 0.5) > 0.0:
+        raise RecordingError(f"{name}: most individuals stand still, so there is no motion to infer a law from")
+    if not np.median(near) > 0.0:
+        raise RecordingError(f"{name}: individuals are in one place, so there are no distances to infer a law from")
     return TrackScale(
         float(np.median(near)), float(np.quantile(far, 0.9)), float(np.median(speed)),
         float(np.quantile(speed, 0.999)), all_tracks[0].period, _first_radius(all_tracks[0]),
@@ -221,4 +226,5 @@ def _first_radius(tracks: SpanTracks) -> float:
     x = tracks.seen[first][:, seen[first]]
     out = nearest_image(x - x[:, :1], tracks.box, 0)
     spread = float(((out - out.mean(axis=1, keepdims=True)) ** 2).sum(axis=0).mean())
-    return (spread * (tracks.axes + 2.0) / tracks.axes) ** 0.5  # of an even ball the mean square is axes/(axes+2) R²
+    # The mean square of an even disc or ball is axes / (axes + 2) of its radius squared.
+    return float(np.sqrt(spread * (tracks.axes + 2.0) / tracks.axes))
