@@ -1,6 +1,7 @@
 """Which law made the tracks? Recordings by plain NumPy that shares no text with the engine, judged in one table.
 
     python benchmarks/inference.py FOLDER [--set development|judging|walks] [--first 0] [--count 30] [--naming]
+        [--topologies metric,nearest]
 
 A seed draws everything: the law (Vicsek, Couzin, boids, Vásárhelyi with lag, alignment with the 7 nearest), its
 numbers, individuals, frames, rate, size, tracking error, gaps and entries. Seeds of `judging` are never used to
@@ -185,6 +186,7 @@ def walk(g, n, frames, period, size):
 
 
 LAWS_OF = {"vicsek": "vicsek_1995", "couzin": "couzin_2002", "boids": "reynolds_1987", "vasarhelyi": "vasarhelyi_2018"}
+LAWS_OF["nearest"] = "vicsek_1995, nearest"
 
 
 def draw(which, number):
@@ -216,17 +218,17 @@ def holds(value, low, high):
     return (low is None or low <= value) and (high is None or value <= high)
 
 
-def run(which, number, naming):
+def run(which, number, naming, topologies):
     """One recording as a row."""
     tracks, family, truth, known = draw(which, number)
     began = time.process_time()
     if naming:
-        result = law_inference.name_law(tracks, law_inference.LAWS, known)[0]
+        result = law_inference.name_law(tracks, law_inference.LAWS, known, topologies)[0]
     else:
-        result = airflock.infer(tracks, settings=known, check=20)
+        result = airflock.infer(tracks, settings=known, topologies=topologies, check=20)
     best = result.best
     row = {"number": number, "family": family, "best": best and best.name, "verdict": result.verdict}
-    row["right"] = row["best"] == LAWS_OF.get("vicsek" if family == "nearest" else family)
+    row["right"] = row["best"] == LAWS_OF.get(family)
     row["laws"] = {
         law.name: [round(law.gain, 1), round(law.error, 1), round(law.ahead, 2), law.by_chance] for law in result.laws
     }
@@ -254,13 +256,14 @@ def main():
     ask.add_argument("--first", type=int, default=0)
     ask.add_argument("--count", type=int, default=30)
     ask.add_argument("--naming", action="store_true")
+    ask.add_argument("--topologies", default="metric,nearest")
     given = ask.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     file = given.folder / f"{given.which}{'_naming' if given.naming else ''}.jsonl"
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     for number in range(given.first, given.first + given.count):
         if all(row["number"] != number for row in rows):
-            rows.append(run(given.which, number, given.naming))
+            rows.append(run(given.which, number, given.naming, given.topologies.split(",")))
             with file.open("a") as out:
                 out.write(json.dumps(rows[-1]) + "\n")
             print(json.dumps(rows[-1]), flush=True)
