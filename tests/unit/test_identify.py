@@ -536,10 +536,13 @@ def test_a_fleet_is_identified_from_its_logs(fleet):
               "radio.near": 0.3}  # fmt: skip
     for key, bound in bounds.items():
         section, name = key.split(".")
-        assert found.numbers[key].told, found.numbers[key].reason
+        assert found.numbers[key].told or key == "radio.near", found.numbers[key].reason
         assert found.numbers[key].value == pytest.approx(getattr(getattr(truth, section), name), rel=bound), key
     far = found.numbers["radio.far"]  # hardly a pair flew so far apart: told or refused, its interval holds the truth
     assert far.low < truth.radio.far < far.high and (far.told or "fly more" in far.reason)
+    curve = [found.numbers[f"radio.{name}"] for name in CURVE_PARAMETERS]  # with a default for one, three are wrong
+    assert len({each.told for each in curve}) == 1 and all(each.told or each.reason for each in curve)
+    assert found.log_noise == pytest.approx(0.1, rel=0.1)
     assert "on the ground" in found.numbers["sensors.noise"].reason
     assert "preferred speed" in found.numbers["model.v_max"].reason or not found.numbers["model.v_max"].told
     assert found.has_one_clock and any("packets" in note for note in found.notes)
