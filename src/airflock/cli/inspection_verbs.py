@@ -171,6 +171,24 @@ def _print_keys(listed_keys: "list[Key]") -> None:
         console.print(Padding(Text.assemble(key.meaning, (source, "dim")), (0, 0, 0, 4)))
 
 
+@verb(PANEL, "airflock.print_law", "settings trust json", name="print")
+def print_part(o: SimpleNamespace) -> None:
+    """Print a law, or another part of a scenario, as C for firmware, with a test that replays plain Python.
+
+    Example: airflock print vasarhelyi_2018/4ms --out law
+    """
+    from airflock.engine import print_law
+
+    files = print_law(
+        o.law, to=o.to, part=o.part, settings=options.parse_settings(o.settings), precision=o.precision, out=o.out,
+        trust=o.trust,
+    )  # fmt: skip
+    if o.json:
+        terminal.print_json({"files": [str(file) for file in files]})
+    else:
+        terminal.print_message(f"saved {', '.join(str(file) for file in files)}")
+
+
 @verb(PANEL, "airflock.check_types", "json")
 def types(o: SimpleNamespace) -> None:
     """Removed: use mypy, and airflock.check_model in Python.

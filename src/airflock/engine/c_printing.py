@@ -64,6 +64,7 @@ class PrintedPart(NamedTuple):
 def print_law(
     law: Scenario | str | os.PathLike[str],
     *,
+    to: str = "c",
     part: str = "law",
     settings: Mapping[str, Any] | None = None,
     precision: int = 32,
@@ -74,15 +75,17 @@ def print_law(
 
     Parameters
     ----------
-    law : Scenario, str or path
+    law : Scenario, str or path (LAW|PRESET|FILE)
         A preset or scenario file, whose numbers become the defaults; or a law by its name or its file.
-    part : str
+    to : str
+        The language: c, which is C99.
+    part : str (PART)
         law, body, sensor, radio, or the name of one of the scenario's faults.
     settings : mapping, optional
         Keys of the scenario to change, such as {"model.p_rep": 0.14}.
     precision : int
         Bits of a number, 32 or 64; AIRFLOCK_PRECISION chooses the other one when the files are compiled.
-    out : str or path, optional
+    out : str or path (FOLDER), optional
         Folder to write to; by default one named after the part.
     trust : bool
         Whether code that a file names may run.
@@ -102,6 +105,8 @@ def print_law(
     >>> import airflock
     >>> files = airflock.print_law("vasarhelyi_2018/4ms", out="law")  # doctest: +SKIP
     """
+    if to != "c":
+        raise AirflockError(f"to = {to!r}: rules are printed as c alone")
     if precision not in (32, 64):
         raise AirflockError(f"precision = {precision!r} is none of 32, 64")
     printed = printed_part(law, part, settings, trust)
