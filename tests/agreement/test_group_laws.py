@@ -153,9 +153,8 @@ def test_the_law_of_a_group_may_lie_in_a_file_or_be_given(wary, tmp_path):
         airflock.open(scenario, 1, device="python", record=True).advance(0.5).change({"radio.range": 20.0}).advance(0.2)
     )
     recording = airflock.recording_of(flight)
-    assert [group.agents for group in scenario_of_recording(recording).groups] == [
-        (0, 1)
-    ]  # though nobody knows how they fly
+    # though nobody knows how they fly
+    assert [list(group.agents) for group in scenario_of_recording(recording).groups] == [[0, 1]]
 
 
 @pytest.mark.parametrize(

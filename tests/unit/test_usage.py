@@ -74,7 +74,6 @@ from airflock.view.plot_by_kind import KINDS
         ("run x --timesteps 3", "run: --timesteps: unknown option; airflock run --help lists them"),
         ("run x --agent 3", "run: --agent: unknown option; did you mean --agents?"),
         ("sweep x --plots a.png", "sweep: --plots: unknown option; did you mean --plot?"),
-        ("evolve a", "evolve: --out is missing; for instance: airflock evolve"),
         ("plot a --kind serie", "plot: --kind serie is none of trajectories, series, rules, transfer, scene"),
         ("fly prepar", "fly: prepar: unknown command; did you mean prepare?"),
         ("fly prepare a --member 3", "fly prepare: --member: unknown option; did you mean --members?"),
@@ -88,6 +87,16 @@ def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys
     assert ended.value.code == 2 and told.out == ""
     assert told.err.startswith(f"airflock: {line}")
     assert len(told.err.splitlines()) == 1
+
+
+def test_a_search_without_a_folder_asks_for_one_and_names_what_else_is_wrong(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["/anywhere/airflock", "evolve", "a"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    lines = capsys.readouterr().err.splitlines()
+    assert ended.value.code == 2 and len(lines) == 2
+    assert lines[0] == "airflock: out is missing; give the folder of the run: --out DIR"
+    assert lines[1].startswith("airflock: a: no such file or preset")
 
 
 @pytest.mark.parametrize("after", [0, 30], ids=["in the probe", "in the flight"])

@@ -98,7 +98,11 @@ def print_law(
     Raises
     ------
     RuleError
-        Where a rule has no form in C, such as a loop: with file, line, and what to write instead.
+        Where a rule has no form in C, such as a loop over a list: with file, line, and what to write instead.
+    AirflockError
+        For a part that the scenario lacks, another language, or another precision.
+    ScenarioError
+        If there is no such law, preset or file, or a key is wrong.
 
     Examples
     --------

@@ -152,7 +152,7 @@ def open_folder(folder: Path, work: Work, *, resume: bool | None = None, also: M
 def run_place(out: str | os.PathLike[str] | None) -> Path:
     """Return the folder of a run that needs one. Raises StudyError where none is given."""
     if out is None:
-        raise StudyError("out: is missing; give the folder of the run (--out DIR)")
+        raise StudyError("out is missing; give the folder of the run: --out DIR")
     return expand_path(out)
 
 
