@@ -379,8 +379,8 @@ def plot_inferred(result: InferResult, *, ax: Axes | None = None) -> Figure:
     Katz et al., PNAS 108, 18720 (2011). A law that acts by velocities alone, such as alignment,
     shows no map.
     """
-    laws = result.laws[:MAX_LAWS]
-    columns = [("tracks", laws[0].maps.seen, laws[0].maps.edges)] + [(w.name, w.maps.law, w.maps.edges) for w in laws]
+    maps = [(law.name, law.maps) for law in result.laws if law.maps is not None][:MAX_LAWS]
+    columns = [("tracks", maps[0][1].seen, maps[0][1].edges), *((name, own.law, own.edges) for name, own in maps)]
     figure, panels = style.figure_and_panels(
         ax, 2, len(columns), 1.0 + 2.2 * len(columns), 4.8, sharex=True, sharey=True
     )
