@@ -255,6 +255,7 @@ def vocabulary() -> None:
         "boundary": "of a model: called for each wall and obstacle; returns Walls",
         "flock": "of a model: called once for the whole flock; fills the columns of Shared",
         "decide": "of a model: returns the command, and its Memory if it has one",
+        "steer": "of the package: makes of a law's command one that the body takes ([steer])",
         "meet": "of a topology: says whom of those that it hears an agent meets",
         "missed": "of a radio: the probability that nothing arrives of what one agent sends another at a decision",
         "missed_few": "of a radio: the same, if few packets are sent at a decision",
