@@ -86,6 +86,36 @@ def test_a_law_that_replaces_another_flies_its_body_at_its_speed():
     assert any("[steer]" in note for note in scenario.notes)
 
 
+def test_a_converted_group_law_is_noted_and_flies_from_a_card_as_from_its_scenario():
+    fish = [{"name": "fish", "agents": 2, "model": {"kind": "couzin_2002"}}]
+    scenario = airflock.load("vasarhelyi_2018/real_4ms", {"agents": 4, "groups": fish})
+    assert scenario.model.steer is None and any("model couzin_2002 commands becomes" in n for n in scenario.notes)
+    card = Mission.prepare(scenario, site=(47.5, 19.04, 120.0), members=[1, 2, 3, 4])
+    steered = [law for law, _, _ in card.own if law.steer is not None]
+    assert len(steered) == 2 and card.steer == scenario.resolved_steer()
+
+
+def test_a_drag_descent_is_added_to_what_the_body_takes_or_refused():
+    preset, few = "vasarhelyi_2018/fixed_wing", {"agents": 4, "duration": 2.0}
+    fish = airflock.load(preset, few, law="couzin_2002").model
+    assert fish.command == "velocity" and fish.added is not None and fish.steer is not None
+    with pytest.raises(ScenarioError, match="drag_descent velocity: no sum of the two"):
+        airflock.load(preset, few | {"body.kind": "heading"})
+    with pytest.raises(RuleError, match="is a sum of velocitys"):
+        law_for_command(airflock.load(preset, few).model, "heading")
+
+
+def test_a_note_names_the_speed_at_which_a_converted_law_flies():
+    """A body that takes a heading flies at its own speed, so the speed of [steer] is not named."""
+    for law, body in (("vasarhelyi_2018", "heading"), ("couzin_2002", "multirotor")):
+        scenario = flown(law, body, agents=4, duration=4.0)
+        (note,) = (each for each in scenario.notes if "becomes the" in each)
+        named = float(note.partition("speed = ")[2].split()[0])
+        recording = airflock.simulate(scenario, seed=1)
+        fastest = float(np.linalg.norm(recording["velocity"].values, axis=1).max())
+        assert fastest == pytest.approx(named, rel=0.05)
+
+
 def test_a_law_on_a_body_that_takes_its_command_is_not_steered():
     assert all(airflock.load(name).model.steer is None for name in airflock.presets())
     assert set(STEERING) == {

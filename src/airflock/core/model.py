@@ -261,6 +261,8 @@ def _terms(given: Any, sums: Any, name: str) -> dict[str, tuple[str, str]]:
 
 def steered_law(law: Model, command: str, steer: Callable[..., Any]) -> Model:
     """Return a law whose command a rule turns into one of another kind: a velocity, an acceleration or a heading."""
+    if law.added is not None:
+        raise RuleError(f"model {law.name} is a sum of {law.command}s; a body that takes a {command} cannot fly it")
     return replace(law, command=command, steer=steer)
 
 

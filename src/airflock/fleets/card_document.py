@@ -112,7 +112,7 @@ def make_card_document(
         },
         "silence": to_json_table(silence),
         **({"topology": to_json_table(scenario.topology.numbers)} if scenario.topology.rule is not None else {}),
-        **({"steer": to_json_table(scenario.resolved_steer())} if scenario.model.steer else {}),
+        **({"steer": to_json_table(scenario.resolved_steer())} if scenario.steers else {}),
         "safety": _with_dead_time(limits),
         "fence": {
             "corners": fence_corners(scenario.world, margin),

@@ -180,7 +180,14 @@ def collect_parts(
     usual = default_body(law.command if law else "velocity")
     body = one(BODIES, caller_parts.body, usual)
     if law is not None and "body" not in missing:
-        law = law_for_command(law, body.accepts)
+        with errors.collecting():
+            law = law_for_command(law, body.accepts)
+    if law is not None and "aero" in document:
+        # The section [aero] alone adds drag descent: no preset needs a second law for it. It adds to
+        # what the body takes, so the law's command is converted before.
+        more = drag_descent_errors(law)
+        errors.add(*more)
+        law = law if more else with_drag_descent(law)
     metrics = one(SETS, caller_parts.metrics)
     sensors = one(SENSORS, caller_parts.sensors)
     transmission = one(RADIOS, caller_parts.radio)
@@ -206,16 +213,11 @@ def collect_parts(
 def _law(
     document: Mapping[str, Any], given: CallerParts, folder: Path | None, errors: ErrorCollector, trust: bool
 ) -> Model | None:
-    """Find the law, and add drag descent for a section [aero]; None where it is missing."""
+    """Find the law; None where it is missing."""
     table, law = document.get("model", {}), given.law
     if not isinstance(table, Mapping):
         errors.add(f"model = {table!r} is not a table; write model.kind = {table!r}")
     elif law is None:
         with errors.collecting():
             law = find_law(table.get("kind"), folder, trust=trust)
-    if law is None or "aero" not in document:
-        return law
-    # The section [aero] alone adds drag descent: no preset needs a second law for it.
-    more = drag_descent_errors(law)
-    errors.add(*more)
-    return law if more else with_drag_descent(law)
+    return law

@@ -179,7 +179,7 @@ class Scenario:
         }
         # The dead time is counted in steps (`step_counts`); no rule of a body reads it.
         columns["b"] = tuple(name for name in columns["b"] if name not in number_names(BodyParameters))
-        if not any(law.model.steer for law in self.laws):
+        if not self.steers:
             del columns["steer"]
         return columns | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
 
@@ -335,6 +335,11 @@ class Scenario:
         """Names of order parameters that need metrics.max_e, where neither it nor an arena says how large that is."""
         known = self.metrics.numbers.max_e is not None or largest_extension(self.world)
         return set() if known else {"cns_ext", "quality", "cns_ext_groups", "quality_groups"}
+
+    @property
+    def steers(self) -> bool:
+        """True if the command of the flock's law, or of a group's, is converted for the body."""
+        return any(law.model.steer for law in self.laws)
 
     def resolved_steer(self) -> steering.Parameters:
         """Return how commands are converted, open numbers derived from the law, the fitness and the body."""

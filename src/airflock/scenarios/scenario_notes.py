@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from airflock.core import CLOCKS, Metric, Quantity, declarations, telling_digits
+from airflock.core import CLOCKS, Metric, Model, Quantity, declarations, telling_digits
 from airflock.parts import METRICS
+from airflock.parts.steering import STEERING
 from airflock.scenarios.cost import cell_notes, metrics_use_cells, uses_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_checks import largest_extension, stall_errors, uses_lifting_line
@@ -19,6 +20,18 @@ def _after_battery(scenario: Scenario) -> str:
     return ", and it stays in the plane and counts"
 
 
+def _steer_note(scenario: Scenario, law: Model) -> str:
+    """Return a note: how a law's command is converted for the body, and the numbers that count."""
+    q, body = scenario.resolved_steer(), scenario.body
+    gives, taken = next(pair for pair, rule in STEERING.items() if rule is law.steer)
+    if taken == "heading":  # such a body flies at a speed of its own, whatever the law wants
+        own = getattr(body.numbers, "speed", None)
+        how = f"by its direction alone, at the body's speed{'' if own is None else f', body.speed = {own:g} m/s'}"
+    else:
+        how = f"by [steer]: speed = {q.speed:g} m/s, response = {q.response:g} s"
+    return f"the {gives} that model {law.name} commands becomes the {taken} that body {body.rule.name} takes, {how}"
+
+
 def setting_notes(scenario: Scenario) -> list[str]:
     """Return notes on costs, rounded times and numbers that contradict each other."""
     cells = uses_all_cores(scenario) and metrics_use_cells(scenario)
@@ -29,12 +42,7 @@ def setting_notes(scenario: Scenario) -> list[str]:
             f"metrics.max_e is missing: without an arena the largest extension is unknown, so {', '.join(sorted(nan))} "
             "are nan; give metrics.max_e in m"
         )
-    if scenario.model.steer is not None:
-        q = scenario.resolved_steer()
-        notes.append(
-            f"model {scenario.model.name} commands another kind than body {scenario.body.rule.name} takes, so [steer] "
-            f"converts it: speed = {q.speed:g} m/s, response = {q.response:g} s"
-        )
+    notes += [_steer_note(scenario, law.model) for law in scenario.laws if law.model.steer is not None]
     p = scenario.parameters
     body, duration = scenario.body.numbers, scenario.flight.duration
     if getattr(body, "battery", "endless") == "lithium" and getattr(body, "hover_power", 0.0) > 0.0:

@@ -512,11 +512,14 @@ def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard |
     errors += _group_errors(groups, members)
     if not are_valid_shapes(rows):
         errors.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
+    laws = [each for each in (law, *(row[0] for row in own)) if each is not None]
+    if steer is not None and any(each.steer for each in laws):
+        errors += [f"steer.{key} is missing" for key in ("speed", "response") if getattr(steer, key) is None]
     if errors or law is None:
         return None
     place = WorldMap(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
-        look=wall_reach(law, parameters), casts=any(each.sight is not None for each in (law, *(row[0] for row in own))),
+        look=wall_reach(law, parameters), casts=any(each.sight is not None for each in laws),
     )  # fmt: skip
     return FlightCard(
         name=str(d["name"]),
