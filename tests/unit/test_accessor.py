@@ -39,3 +39,10 @@ def test_a_dataset_of_movement_is_measured_in_one_line(ring, plural):
 def test_a_name_that_is_none_is_refused_with_the_nearest(ring):
     with pytest.raises(AttributeError, match="flock has no miling; .*milling"):
         ring.flock.miling()
+    with pytest.raises(AttributeError, match="flock has no zzz; known: score, .*milling"):
+        ring.flock.zzz()
+
+
+def test_each_name_of_the_accessor_has_the_text_of_its_function(ring):
+    for name, function in measures().items():
+        assert getattr(ring.flock, name).__doc__ == function.__doc__

@@ -8,6 +8,7 @@ import subprocess
 
 import pytest
 
+import airflock
 from airflock.core import HeardNeighbour, State, decide, number_names
 from airflock.engine import c_printing as print_module
 from airflock.engine.c_printing import CasePercept, print_law, printed_part
@@ -82,12 +83,19 @@ def struct_of(printer, kind, known):
     return known[kind]
 
 
-@pytest.mark.parametrize("law", ["vasarhelyi_2018", "viragh_2014", "formation", "vicsek_1995", "chen_2014"])
-def test_a_whole_decision_in_c_has_the_bits_of_a_pilot(law, tmp_path):
+@pytest.mark.parametrize(
+    ("law", "body"),
+    [(law, "") for law in ("vasarhelyi_2018", "viragh_2014", "formation", "vicsek_1995", "chen_2014")]
+    + [("couzin_2002", "multirotor"), ("reynolds_1987", "multirotor"), ("viragh_2014", "steered")],
+)
+def test_a_whole_decision_in_c_has_the_bits_of_a_pilot(law, body, tmp_path):
+    """With a body that takes another kind of command, too: then C converts as the pilot does."""
     rng = random.Random(law)
-    printed = printed_part(law, "law", None, False)
+    flown = airflock.load("vasarhelyi_2018/4ms", {"body.kind": body}, law=law) if body else law
+    printed = printed_part(flown, "law", None, False)
+    assert (printed.steer is not None) == bool(body)
     print_module.command_text(printed)
-    print_law(law, out=tmp_path)
+    print_law(flown, out=tmp_path)
     library = tmp_path / "law.so"
     flags = [*STRICT, "-DAIRFLOCK_PRECISION=64", "-shared", "-fPIC"]
     subprocess.run(["gcc", *flags, tmp_path / f"{law}.c", "-lm", "-o", library], check=True)
@@ -109,6 +117,13 @@ def test_a_whole_decision_in_c_has_the_bits_of_a_pilot(law, tmp_path):
     uniform = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_int)(
         lambda _, draw: CasePercept(*[0.0] * 7).uniform(draw)
     )
+    ray = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, *[ctypes.c_double] * 4)(
+        lambda _, *direction: CasePercept(*[0.0] * 7).ray(*direction)
+    )
+    memory = []
+    if printed.part.Memory is not None:
+        kind = struct_of(printer, printed.functions["decide"].arguments["memory"], known)
+        memory = [ctypes.byref(kind(*printed.part.Memory()))]
     for _ in range(200):
         own, index = state(20.0, 3.0), 4
         heard = [
@@ -121,17 +136,20 @@ def test_a_whole_decision_in_c_has_the_bits_of_a_pilot(law, tmp_path):
         expected = decide(
             printed.part, printed.numbers, own, heard, surfaces,
             time=offsets[0], period=0.1, index=index, group=1.0, percept=CasePercept(*offsets),
+            steer=printed.steer,
         )  # fmt: skip
         percept = wanted["Percept"](*offsets)
-        percept.normal, percept.uniform = (ctypes.cast(each, ctypes.c_void_p) for each in (normal, uniform))
+        percept.normal, percept.uniform, percept.ray = (
+            ctypes.cast(each, ctypes.c_void_p) for each in (normal, uniform, ray)
+        )
         rows = [wanted["Heard"](wanted["State"](*h.state), h.age, h.who, h.group) for h in heard]
         walls = [wanted["Surface"](*each) for each in surfaces]
         found = command(
             ctypes.byref(numbers), ctypes.byref(wanted["State"](*own)), index, ctypes.c_double(1.0),
             (wanted["Heard"] * len(rows))(*rows), len(rows), (wanted["Surface"] * len(walls))(*walls), len(walls),
-            ctypes.byref(percept), ctypes.c_double(0.1),
+            *memory, ctypes.byref(percept), ctypes.c_double(0.1),
         )  # fmt: skip
-        rounding = 1e-12 if law in ("vicsek_1995", "chen_2014") else 0.0  # they call sin, cos, exp or pow
+        rounding = 1e-12 if law in ("vicsek_1995", "chen_2014", "couzin_2002") else 0.0  # they call sin, exp or pow
         assert (found.v0, found.v1, found.v2) == pytest.approx(expected.command, rel=rounding, abs=rounding)
 
 
@@ -140,6 +158,9 @@ import math
 from airflock import Parameters
 
 COMMAND = "velocity"
+
+def halved(x):
+    return x if x < 1.0 else halved(0.5 * x)
 
 def decide(own, percept):
     {body}
@@ -153,22 +174,124 @@ def decide(own, percept):
         ("double = own.vx", "double is a name that C reserves; give the variable another name"),
         ("for x in (own.vx, own.vy): pass", "has a loop that is not printed; write for k in range(...)"),
         ("x = math.gamma(own.vx)", "calls math.gamma, which has no form in C"),
+        ("x = halved(own.vx)", "calls itself; a rule that is printed has a loop instead"),
+        ("for k in range(3): pass\n    else: pass", "has an else behind a loop"),
+        ("while own.vx > 1.0: break\n    else: pass", "has an else behind a loop"),
+        ("x = own.vx / 1e-50", "1e-50 is no number of single precision"),
+        ("n = 3000000000", "3000000000 has no form in C"),
+        ("NAN = own.vx", "NAN is a name that C reserves"),
     ],
 )
 def test_a_law_that_has_no_form_in_c_is_refused_with_file_line_and_what_to_write(body, says, tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(LAW.format(body=body))
-    with pytest.raises(RuleError, match=r"mine\.py:\d+: rule decide: ") as raised:
+    with pytest.raises(RuleError, match=r"mine\.py:\d+: rule (decide|halved): ") as raised:
         print_law(file, out=tmp_path / "law")
     assert says in str(raised.value) and "\n" not in str(raised.value)
     assert not (tmp_path / "law").exists()
 
 
+OWN = '''
+"""A law whose text */ would end a comment."""
+from dataclasses import dataclass
+from typing import NamedTuple
+import airflock
+
+COMMAND = "velocity"
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    weights: tuple = airflock.quantity((1.0, 2.0), "1", size=2, low=0.0, high=9.0, meaning="weights /* of two */")
+    sign: str = airflock.choice("plus", ("plus", "minus"), meaning="sign")
+
+class Memory(NamedTuple):
+    before: float = 0.25
+
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+def scaled(x, by=2.0):
+    return max(x, 0.5) * by
+
+def counted(x):
+    """The end of a loop is that of its first turn, and names may end as those do that C needs."""
+    n, total = 3, 0.0
+    for k in range(n):
+        n, t1_ = 1, x * k
+        total += t1_
+    sqrt, sqrt_ = abs(x), 2.0
+    return total + sqrt * sqrt_ + ((x > 0.0) + (x > 1.0))
+
+def decide(own, memory, percept, p):
+    total = 0.0
+    for k in range(2):
+        total += p.weights[k] * percept.normal(k)
+    if p.sign == "minus":
+        total = -total
+    pair = Pair(second=scaled(by=total, x=own.vx), first=scaled(own.vz))
+    return pair.second - pair.first + counted(own.vy), own.vy % 3.0, memory.before, Memory(total)
+'''
+
+
+def test_a_law_of_ones_own_with_vectors_a_memory_and_draws_gives_the_bits_of_plain_python(tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    files = print_law(tmp_path / "mine.py", out=tmp_path / "law")
+    assert_same_bits(files)
+    assert "#define mine_START {R(0.25)}" in files[0].read_text()
+
+
+def test_stubs_come_only_with_laws_that_call_nothing_of_a_percept(tmp_path):
+    """The percept of a stub has no functions: a law that calls one would jump to address zero on board."""
+    for law in (name for name in LAWS if LAWS[name].flock is None):
+        files = print_law(law, out=tmp_path / law)
+        if any("stub" in file.name for file in files):
+            assert "percept->context" not in files[1].read_text(), law
+
+
+def test_the_replay_of_a_law_fails_where_c_gives_another_number_or_none(tmp_path):
+    files = print_law("viragh_2014", out=tmp_path)
+    text = files[1].read_text()
+    head, brace, body = text.partition("viragh_2014_boundary(")[2].partition("{\n")
+    for wrong in ("R(1e-6)", "(real)NAN"):
+        broken = body.replace("return (viragh_2014_Walls){", f"return (viragh_2014_Walls){{{wrong} + ", 1)
+        assert broken != body
+        files[1].write_text(text.replace(brace + body, brace + broken))
+        program = compiled(files, "-DAIRFLOCK_PRECISION=64")
+        assert subprocess.run([program, files[0].with_suffix(".cases")], capture_output=True).returncode != 0
+
+
+def test_a_header_notes_what_of_the_scenario_it_has_not(tmp_path):
+    settings = {"groups": [{"name": "fish", "agents": 2, "model": {"kind": "viragh_2014"}}], "topology.kind": "nearest"}
+    header = print_law("vasarhelyi_2018/4ms", settings=settings, out=tmp_path)[0].read_text()
+    for what in ("group fish", "topology nearest", "in a plane"):
+        assert what in header
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (OWN.replace("own.vy % 3.0", "(own.vy - own.vy) / (own.vx - own.vx)"), "gives hardly ever a finite number"),
+        (OWN.replace("weights: tuple", "far: float | None = airflock.quantity(None, 'm', low=0.0, high=9.0, "
+                     "meaning='far')\n    weights: tuple"), "far = None"),
+    ],
+)  # fmt: skip
+def test_numbers_that_are_none_or_never_finite_are_refused_in_one_line(text, says, tmp_path):
+    (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(AirflockError, match=says) as raised:
+        print_law(tmp_path / "mine.py", out=tmp_path / "law")
+    assert "\n" not in str(raised.value) and not (tmp_path / "law").exists()
+
+
 def test_a_law_for_the_whole_flock_and_an_unknown_part_are_refused_in_one_line(tmp_path):
     with pytest.raises(RuleError, match="whole flock at once"):
         print_law("dimock_2003", out=tmp_path)
-    with pytest.raises(AirflockError, match="no such part; .*body"):
-        print_law("vasarhelyi_2018/4ms", part="bdy", out=tmp_path)
+    for part in ("bdy", "wind"):
+        with pytest.raises(AirflockError, match="no such part; .*body"):
+            print_law("vasarhelyi_2018/4ms", part=part, out=tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(AirflockError, match="file: "):
+        print_law("vasarhelyi_2018/4ms", out=tmp_path / "file")
 
 
 def test_numbers_of_a_preset_are_the_defaults_of_the_header(tmp_path):

@@ -9,8 +9,11 @@ import pytest
 import airflock
 from against_reference import compared
 from airflock.core import Own
+from airflock.drones.onboard.card import CardError, card_hash, parse_card
+from airflock.fleets.card_document import make_card_document
 from airflock.parts import BODIES
-from airflock.parts.steering import STEERING, Parameters
+from airflock.parts.steering import STEERING, Parameters, law_for_command
+from airflock.support import RuleError, ScenarioError
 from scenarios_drawn import Draw
 
 
@@ -90,9 +93,13 @@ def test_a_converted_group_law_is_noted_and_flies_from_a_card_as_from_its_scenar
     fish = [{"name": "fish", "agents": 2, "model": {"kind": "couzin_2002"}}]
     scenario = airflock.load("vasarhelyi_2018/real_4ms", {"agents": 4, "groups": fish})
     assert scenario.model.steer is None and any("model couzin_2002 commands becomes" in n for n in scenario.notes)
-    card = Mission.prepare(scenario, site=(47.5, 19.04, 120.0), members=[1, 2, 3, 4])
+    made = make_card_document(scenario, site=(47.5, 19.04, 120.0), members=[1, 2, 3, 4], mission=1, expires=1)
+    card = parse_card({**made, "hash": card_hash(made)})
     steered = [law for law, _, _ in card.own if law.steer is not None]
     assert len(steered) == 2 and card.steer == scenario.resolved_steer()
+    del made["steer"]
+    with pytest.raises(CardError, match=r"steer\.speed is missing"):
+        parse_card({**made, "hash": card_hash(made)})
 
 
 def test_a_drag_descent_is_added_to_what_the_body_takes_or_refused():
@@ -101,19 +108,19 @@ def test_a_drag_descent_is_added_to_what_the_body_takes_or_refused():
     assert fish.command == "velocity" and fish.added is not None and fish.steer is not None
     with pytest.raises(ScenarioError, match="drag_descent velocity: no sum of the two"):
         airflock.load(preset, few | {"body.kind": "heading"})
-    with pytest.raises(RuleError, match="is a sum of velocitys"):
+    with pytest.raises(RuleError, match="is a sum that commands a velocity; the body takes a heading"):
         law_for_command(airflock.load(preset, few).model, "heading")
 
 
 def test_a_note_names_the_speed_at_which_a_converted_law_flies():
     """A body that takes a heading flies at its own speed, so the speed of [steer] is not named."""
     for law, body in (("vasarhelyi_2018", "heading"), ("couzin_2002", "multirotor")):
-        scenario = flown(law, body, agents=4, duration=4.0)
+        scenario = flown(law, body, agents=9, duration=8.0)
         (note,) = (each for each in scenario.notes if "becomes the" in each)
         named = float(note.partition("speed = ")[2].split()[0])
-        recording = airflock.simulate(scenario, seed=1)
-        fastest = float(np.linalg.norm(recording["velocity"].values, axis=1).max())
-        assert fastest == pytest.approx(named, rel=0.05)
+        recording = airflock.simulate(scenario, seed=1, device="python")
+        speeds = np.linalg.norm(recording["velocity"].values[-1], axis=0)
+        assert float(np.median(speeds)) == pytest.approx(named, rel=0.1)
 
 
 def test_a_law_on_a_body_that_takes_its_command_is_not_steered():

@@ -262,7 +262,7 @@ def _terms(given: Any, sums: Any, name: str) -> dict[str, tuple[str, str]]:
 def steered_law(law: Model, command: str, steer: Callable[..., Any]) -> Model:
     """Return a law whose command a rule turns into one of another kind: a velocity, an acceleration or a heading."""
     if law.added is not None:
-        raise RuleError(f"model {law.name} is a sum of {law.command}s; a body that takes a {command} cannot fly it")
+        raise RuleError(f"model {law.name} is a sum that commands a {law.command}; the body takes a {command}")
     return replace(law, command=command, steer=steer)
 
 

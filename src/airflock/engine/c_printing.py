@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 from airflock.core import (
     FAR,
     FAULT_RULES,
-    PERCEPT_METHODS,
     TINY,
     HeardNeighbour,
     Own,
+    Parameters,
     Percept,
     Quantity,
     State,
@@ -28,16 +28,26 @@ from airflock.core import (
     tree_of,
     vector_sizes,
 )
-from airflock.engine.text.c99 import PRELUDE, REAL, WHOLE, CPrinter, Function
+from airflock.engine.text.c99 import PRELUDE, REAL, WHOLE, CPrinter, Function, fits_float
 from airflock.scenarios import MODELS, Scenario, find_law, scenario_variant
-from airflock.support import AirflockError, RuleError, expand_path, suggest, to_identifier
+from airflock.support import AirflockError, RuleError, as_error, expand_path, suggest, to_identifier
 
 # The rules that are printed of each kind, and the letter of its numbers. Others (`flock`, `limits`,
 # `lasts`, `see`) speak of a whole flock or scenario.
 KINDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "law": (
         "p",
-        ("preferred_speed", "interaction_range", "reach", "sight", "wall_reach", "neighbour", "boundary", "decide"),
+        (
+            "preferred_speed",
+            "interaction_range",
+            "reach",
+            "sight",
+            "wall_reach",
+            "neighbour",
+            "boundary",
+            "decide",
+            "steer",
+        ),
     ),
     "body": ("b", ("move", "endures")),
     "sensor": ("s", ("measure", "error")),
@@ -50,12 +60,14 @@ CASES = 10_000
 
 
 class PrintedPart(NamedTuple):
-    """A part as C: its name in C, the part, its numbers, and its rules by their names."""
+    """A part as C: its name in C, the part, its numbers, its rules by their names, and what the header has to note."""
 
     name: str
     part: Any
     numbers: Any
     letter: str
+    steer: Any  # numbers of [steer], None where the body takes what the law commands
+    notes: list[str]
     rules: dict[str, Callable[..., Any]]
     printer: CPrinter
     functions: dict[str, Function]
@@ -123,18 +135,22 @@ def print_law(
         f"{name}.cases": cases_of(printed, CASES),
         "CMakeLists.txt": _template("CMakeLists.txt", name),
     }
-    # Stubs send velocities, and call a law without a memory.
-    if getattr(printed.part, "command", "") == "velocity" and printed.part.Memory is None:
+    # Stubs send velocities, and call a law without a memory, rays or draws: they have none to hand it.
+    calls = any("percept->context" in function.text for function in printed.functions.values())
+    if getattr(printed.part, "command", "") == "velocity" and printed.part.Memory is None and not calls:
         files |= {f"stub_{stub}": _template(stub, name) for stub in STUBS}
-    folder.mkdir(parents=True, exist_ok=True)
-    for file, content in files.items():
-        (folder / file).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with as_error(folder, AirflockError):
+        folder.mkdir(parents=True, exist_ok=True)
+        for file, content in files.items():
+            (folder / file).write_bytes(content if isinstance(content, bytes) else content.encode())
     return [folder / file for file in files]
 
 
-def _template(file: str, name: str) -> str:
+def _template(file: str, name: str, **parts: str) -> str:
     text = resources.files("airflock.engine.text").joinpath(f"templates/{file}").read_text(encoding="utf-8")
-    return text.replace("@LAW@", name)
+    for place, part in {**parts, "LAW": name}.items():
+        text = text.replace(f"@{place}@", part)
+    return text
 
 
 def printed_part(
@@ -145,7 +161,7 @@ def printed_part(
     text = law if isinstance(law, Scenario) else os.fspath(law)
     if part == "law" and isinstance(text, str) and not settings and (text in MODELS or text.endswith(".py")):
         rules: Any = find_law(text, where="law", trust=True)
-        numbers = rules.Parameters()
+        numbers, steer, notes = rules.Parameters(), None, []
     else:
         scenario = scenario_variant(law, settings, trust=trust)
         faults = {entry.fault.name: entry for entry in scenario.faults}
@@ -154,8 +170,16 @@ def printed_part(
             known[name] = (own.rule, own.numbers)
         known |= {name: (entry.fault, entry.numbers) for name, entry in faults.items()}
         if part not in known:
-            raise AirflockError(f"part = {part!r}: {scenario.name} has no such part; {suggest(part, known)}")
+            some = suggest(part, known, f"known: {', '.join(known)}")
+            raise AirflockError(f"part = {part!r}: {scenario.name} has no such part; {some}")
         rules, numbers = known[part]
+        steer = scenario.resolved_steer() if getattr(rules, "steer", None) is not None else None
+        notes = [f"Agents of group {each.name} have a law or numbers of their own, which are not these."
+                 for each in scenario.groups if each.law is not None or each.numbers]  # fmt: skip
+        if scenario.topology.rule is not None:
+            notes.append(f"Give it those heard whom topology {scenario.topology.rule.name} selects.")
+        if scenario.dimensions == 2:
+            notes.append("The scenario flies in a plane: set z and vz of all states to 0.")
         kind = "fault" if part in faults else part
     letter, names = KINDS[kind]
     if getattr(rules, "flock", None) is not None or getattr(rules, "added", None) is not None:
@@ -164,11 +188,17 @@ def printed_part(
         )
     chosen = {name: value for name, value in vars(numbers).items() if isinstance(value, str)}
     plain = number_names(numbers)
+    for key in plain:
+        if getattr(numbers, key) is None or not fits_float(getattr(numbers, key)):
+            value = getattr(numbers, key)
+            raise AirflockError(f"{rules.name}: {key} = {value}; give a number that fits single precision")
     name = to_identifier(rules.name)
     printer = CPrinter(name, {letter: chosen}, {letter: vector_sizes(plain)})
     types = {"fast": WHOLE, "slow": WHOLE, letter: printer.record(f"{name}_Parameters", plain)}
     types["own"] = printer.record(f"{name}_Own", Own._fields)
     types["percept"] = printer.record(f"{name}_Percept", Percept._fields)
+    if steer is not None:
+        types["steer"] = printer.record(f"{name}_Steer", number_names(steer))
     for argument, record in RECORDS.items():
         found = getattr(rules, record, None)
         if found is not None:
@@ -177,68 +207,53 @@ def printed_part(
     functions = {each: printer.rule(rule, types) for each, rule in own_rules.items()}
     if not functions:
         raise RuleError(f"{rules.name} has no rule that can be printed; {kind} rules are {', '.join(names)}")
-    return PrintedPart(name, rules, numbers, letter, own_rules, printer, functions)
+    return PrintedPart(name, rules, numbers, letter, steer, notes, own_rules, printer, functions)
 
 
 def header_text(printed: PrintedPart, precision: int) -> str:
     """Return the header: numbers with unit, range and source, records, and the rules."""
     name, printer = printed.name, printed.printer
-    guard = f"AIRFLOCK_{name.upper()}_H"
     chosen = [f"{key} = {value}" for key, value in vars(printed.numbers).items() if isinstance(value, str)]
-    title = (getattr(printed.part, "doc", "") or "").strip().partition("\n")[0]
-    lines = [
-        f"/* {name}: {title or 'printed rules'}",
-        " * Printed by Airflock from the Python text that flies; SI units. Do not edit it: print it again.",
-        *([f" * Choices that are compiled in: {', '.join(chosen)}."] if chosen else []),
-        " */",
-        f"#ifndef {guard}", f"#define {guard}", "",
-        "#ifndef AIRFLOCK_PRECISION", f"#define AIRFLOCK_PRECISION {precision}", "#endif",
-        "#ifndef AIRFLOCK_REAL", "#define AIRFLOCK_REAL",
-        "#if AIRFLOCK_PRECISION == 32", "typedef float real;", "#define R(number) number##f",
-        "#else", "typedef double real;", "#define R(number) number", "#endif", "#endif", "",
-    ]  # fmt: skip
+    notes = [f"Choices that are compiled in: {', '.join(chosen)}."] if chosen else []
+    lines: list[str] = []
     about = {key: declared for key, declared, _ in declarations(printed.numbers) if isinstance(declared, Quantity)}
     source = command_text(printed)  # first, as it declares structs of its own
     for record, fields in printer.structs.items():
-        if record == f"{name}_Percept":
-            lines += _percept_struct(name)
-            continue
         lines.append("typedef struct {")
         for field, kind in fields.items():
             note = about.get(field) if record == f"{name}_Parameters" else None
             lines.append(f"  {kind} {field};" + (f"  {_note(note)}" if note else ""))
+        if record == f"{name}_Percept":
+            lines.append(_template("percept.h", name).rstrip())
         lines += [*([] if fields else ["  char nothing;  /* C has no empty struct */"]), f"}} {record};", ""]
-    values = ", ".join(f"R({float(getattr(printed.numbers, key))!r})" for key in number_names(printed.numbers)) or "0"
-    lines += [f"#define {name}_DEFAULTS {{{values}}}", ""]
+    values = {"DEFAULTS": printed.numbers, "STEER": printed.steer}
+    if getattr(printed.part, "Memory", None) is not None:
+        values["START"] = printed.part.Memory()  # of a memory, before the first decision
+    for what, record in values.items():
+        if record is not None:
+            lines.append(f"#define {name}_{what} {{{', '.join(f'R({each!r})' for each in _flat(record)) or '0'}}}")
+    lines.append("")
     for rule, function in printed.functions.items():
-        doc = (printed.rules[rule].__doc__ or rule).strip().partition("\n")[0]
-        lines += [f"/* {doc.replace('*/', '')} */", _prototype(function), ""]
+        head, _, _ = function.text.partition(" {")
+        lines += [_comment((printed.rules[rule].__doc__ or rule).strip().partition("\n")[0]), f"{head};", ""]
     lines += [source.partition("{")[0].rstrip() + ";", ""] if source else []
-    return "\n".join([*lines, "#endif", ""])
+    title = (getattr(printed.part, "doc", "") or "").strip().partition("\n")[0]
+    return _template(
+        "header.h", name, TITLE=_comment(f"{name}: {title or 'printed rules'}"), GUARD=f"AIRFLOCK_{name.upper()}_H",
+        NOTES="".join(f"{_comment(each)}\n" for each in (*notes, *printed.notes)), PRECISION=str(precision),
+        DECLARED="\n".join(lines),
+    )  # fmt: skip
+
+
+def _comment(text: str) -> str:
+    """Return a text as one comment of C, which it cannot end."""
+    return f"/* {' '.join(text.replace('*/', '').replace('/*', '').split())} */"
 
 
 def _note(declared: Quantity) -> str:
     unit = "" if declared.unit == "1" else f"{declared.unit}, "
-    text = f"{unit}{declared.low:g} to {declared.high:g}: {declared.meaning} ({declared.source})"
-    return f"/* {' '.join(text.replace('*/', '').split())} */"
-
-
-def _percept_struct(name: str) -> list[str]:
-    """Return the lines of the struct of a percept: offsets, and what ranges and draws on board."""
-    fields = [f"  real {field};" for field in Percept._fields]
-    calls = [
-        "  real (*ray)(const void *context, real ux, real uy, real uz, real length);",
-        "  real (*cast)(const void *context, real ux, real uy, real uz, real length, real radius);",
-        "  real (*normal)(const void *context, int draw);",
-        "  real (*uniform)(const void *context, int draw);",
-        "  const void *context;  /* handed to each of the four; those that the law does not call may be 0 */",
-    ]
-    return ["typedef struct {", *fields, *calls, f"}} {name}_Percept;", ""]
-
-
-def _prototype(function: Function) -> str:
-    head, _, _ = function.text.partition(" {")
-    return f"{head};"
+    source = f" ({declared.source})" if declared.source else ""
+    return _comment(f"{unit}{declared.low:g} to {declared.high:g}: {declared.meaning}{source}")
 
 
 def source_text(printed: PrintedPart) -> str:
@@ -345,7 +360,17 @@ def command_text(printed: PrintedPart) -> str:
             lines.append(f"  {near}{total} = {more};")
         lines.append("  }")
     places = {each: f"&{each}" for each in ("own", "sums", "walls")}
-    lines.append(f"  return {rule.name}({', '.join(places.get(each, each) for each in rule.arguments)});")
+    made = f"{rule.name}({', '.join(places.get(each, each) for each in rule.arguments)})"
+    steer = printed.functions.get("steer")
+    if steer is None:
+        lines.append(f"  return {made};")
+    else:  # the body takes another kind of command than the law gives
+        places |= {"cx": "made.v0", "cy": "made.v1", "cz": "made.v2", "steer": "&steer"}
+        given = ", ".join(places.get(each, each) for each in steer.arguments)
+        sets = (f"made.v{k} = taken.v{k};" for k in range(3))
+        lines += [f"  const {name}_Steer steer = {name}_STEER;", "  (void)steer;", f"  {rule.returned} made = {made};",
+                  f"  const {steer.returned} taken = {steer.name}({given});", f"  {' '.join(sets)}",
+                  "  return made;"]  # fmt: skip
     text = "\n".join(lines)
     names = ("p", "index", "group", "heard", "neighbours", "surfaces", "walls_near", "percept", "period")
     unread = [each for each in names if not re.search(rf"\b{each}\b", text)]
@@ -386,27 +411,26 @@ def cases_of(printed: PrintedPart, count: int, seed: int = 0) -> bytes:
     for name, rule in printed.rules.items():
         found += struct.pack("<d", count)
         done = 0
-        while done < count:
+        for _ in range(50 * count):
             given = drawn_arguments(printed, name, rng)
             try:
-                answer = _flat(rule(*(given[each] for each in printed.functions[name].arguments)))
+                row = _flat((*given.values(), rule(*given.values())))
             except (ZeroDivisionError, OverflowError, ValueError):
                 continue  # plain Python raises where a processor gives inf or nan
-            row = [
-                x
-                for each, value in given.items()
-                for x in _flat(value, printed.numbers if each == printed.letter else None)
-            ]
-            if all(math.isfinite(each) for each in (*row, *answer)):
-                found += struct.pack(f"<{len(row) + len(answer)}d", *row, *answer)
+            if all(math.isfinite(each) for each in row):
+                found += struct.pack(f"<{len(row)}d", *row)
                 done += 1
+            if done == count:
+                break
+        else:
+            raise RuleError(f"{printed.printer.place(printed.functions[name].name)}: gives hardly ever a finite number")
     return bytes(found)
 
 
-def _flat(value: Any, numbers: Any = None) -> list[float]:
+def _flat(value: Any) -> list[float]:
     """Return the numbers of a value, of a record, or of several values."""
-    if numbers is not None:
-        return [float(getattr(value, name)) for name in number_names(numbers)]
+    if isinstance(value, Parameters):
+        return [float(getattr(value, name)) for name in number_names(value)]
     return [x for each in value for x in _flat(each)] if isinstance(value, tuple) else [float(value)]
 
 
@@ -426,6 +450,7 @@ def drawn_arguments(printed: PrintedPart, name: str, rng: random.Random) -> dict
     values["own"] = Own(*(values[each] for each in Own._fields))
     values["percept"] = CasePercept(*(rng.gauss(0.0, 50.0) for _ in Percept._fields))
     values |= {"distance": rng.gauss(10.0, 20.0), "period": 0.1, "dt": rng.uniform(0.005, 0.1), printed.letter: numbers}
+    values |= {"steer": printed.steer}
     for argument, record in RECORDS.items():
         kind = getattr(part, record, None)
         if kind is not None:
@@ -446,35 +471,9 @@ def drawn_arguments(printed: PrintedPart, name: str, rng: random.Random) -> dict
 def test_text(printed: PrintedPart) -> str:
     """Return the test program, which counts the numbers that differ from those of plain Python."""
     name, printer = printed.name, printed.printer
-    lines = [
-        f"/* Replays answers of the Python text from which {name} was printed. */",
-        f'#include "{name}.h"', "", "#include <math.h>", "#include <stdio.h>", "",
-        "typedef struct { long numbers, others, far; double worst; } Outcome;", "",
-        "static void compare(Outcome *outcome, real found, double expected) {",
-        "  const double off = fabs((double)found - expected) / fmax(fabs(expected), 1.0);",
-        "  outcome->numbers++;",
-        "  if ((double)found != expected) outcome->others++;",
-        "  if (!(off <= outcome->worst)) outcome->worst = off;",
-        "  if (!(off <= 1e-3)) outcome->far++;",
-        "}", "",
-    ]  # fmt: skip
     percept = f"{name}_Percept"
-    if any(percept in function.arguments.values() for function in printed.functions.values()):
-        arguments = {"ray": "real ux, real uy, real uz, real length", "normal": "int draw", "uniform": "int draw"}
-        arguments["cast"] = arguments["ray"] + ", real radius"
-        values = {
-            "ray": "R(0.8) * ux + R(0.6) * uy > R(0.3) ? length : R(0.5) * length",
-            "cast": "ray(0, ux, uy, uz, length)",
-            "normal": "R(0.25) * (real)draw - R(0.75)", "uniform": "R(0.125) + R(0.03125) * (real)draw",
-        }  # fmt: skip
-        for method in PERCEPT_METHODS:
-            unread = "".join(
-                f"(void){each}; "
-                for each in ("uz", "radius")
-                if f"real {each}" in arguments[method] and (method, each) != ("cast", "uz")
-            )
-            lines += [f"static real {method}(const void *context, {arguments[method]}) {{",
-                      f"  (void)context; {unread}return {values[method]};", "}", ""]  # fmt: skip
+    takes = any(percept in function.arguments.values() for function in printed.functions.values())
+    lines = [_template("test_percept.c", name)] if takes else []
     for rule, function in printed.functions.items():
         fields, outputs = _places(printer, function.arguments), _paths(printer, function.returned)
         lines += [f"static int replay_{rule}(FILE *file, Outcome *outcome) {{",
@@ -491,19 +490,10 @@ def test_text(printed: PrintedPart) -> str:
             lines.append(f"    const {kind} {argument} = {{{', '.join([*values_of, *more]) or '0'}}};")
         given = ", ".join(each if kind in (REAL, WHOLE) else f"&{each}" for each, kind in function.arguments.items())
         lines.append(f"    const {function.returned} found = {function.name}({given});")
-        lines += [f"    compare(outcome, found{path}, v[{len(fields) + k}]);" for k, path in enumerate(outputs)]
+        lines += [f"    compare(outcome, (real)found{path}, v[{len(fields) + k}]);" for k, path in enumerate(outputs)]
         lines += ["  }", "  return 1;", "}", ""]
-    lines += ["int main(int count, char **words) {", "  FILE *file = count == 2 ? fopen(words[1], \"rb\") : 0;",
-              f'  if (!file) return fprintf(stderr, "usage: test_{name} {name}.cases\\n"), 2;',
-              "  int bad = 0;"]  # fmt: skip
-    for rule in printed.functions:
-        lines += ["  {", "    Outcome outcome = {0, 0, 0, 0.0};", f"    if (!replay_{rule}(file, &outcome)) return 2;",
-                  f'    printf("{rule}: %ld numbers, %ld with other bits, %ld far off, largest difference %.1e\\n",',
-                  "           outcome.numbers, outcome.others, outcome.far, outcome.worst);",
-                  "    /* In single precision a branch may go the other way where two numbers nearly agree. */",
-                  "    bad |= sizeof(real) == 8 ? outcome.worst > 1e-12 : outcome.far * 100 > outcome.numbers;",
-                  "  }"]  # fmt: skip
-    return "\n".join([*lines, "  fclose(file);", "  return bad;", "}", ""])
+    calls = "\n".join(f'  bad |= report("{rule}", replay_{rule}, file);' for rule in printed.functions)
+    return _template("test.c", name, REPLAYS="\n".join(lines), CALLS=calls)
 
 
 def _places(printer: CPrinter, arguments: Mapping[str, str]) -> list[tuple[str, str]]:

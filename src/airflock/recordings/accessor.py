@@ -5,7 +5,7 @@ flight nothing; pictures come from a room above this one, by the public names.
 """
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
 from importlib import import_module
 from typing import Any
 
@@ -49,9 +49,11 @@ class FlockAccessor:
         found = getattr(import_module("airflock"), name) if name in PUBLIC else measures().get(name)
         if found is None:
             suggest = import_module("airflock.support").suggest
-            raise AttributeError(f"flock has no {name}; {suggest(name, (*PUBLIC, *measures()))}")
+            known = (*PUBLIC, *measures())
+            usual = f"known: {', '.join(known)}"
+            raise AttributeError(f"flock has no {name}; {suggest(name, known, usual)}")
         function: Callable[..., Any] = found
-        return lambda *given, **options: function(self.recording, *given, **options)
+        return wraps(function)(lambda *given, **options: function(self.recording, *given, **options))
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *PUBLIC, *measures()})

@@ -18,6 +18,7 @@ RESERVED = frozenset((
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float",
     "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof",
     "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "real", "R",
+    "NAN", "INFINITY", "HUGE_VAL",
 ))  # fmt: skip
 BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 LOGICAL = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.RShift: ">>", ast.LShift: "<<"}
@@ -68,6 +69,7 @@ class CPrinter:
         self.functions: dict[str, Function] = {}
         self.used: set[str] = set()  # of MATHS and PRELUDE
         self.trees: dict[str, ast.FunctionDef] = {}
+        self.begun: set[str] = set()
         self._read = 0
 
     def record(self, name: str, fields: Sequence[str]) -> str:
@@ -92,6 +94,9 @@ class CPrinter:
         """Return a function of the source as C for arguments of these types; RuleError where it has no form in C."""
         found = self.functions.get(name)
         if found is None:
+            if name in self.begun:
+                raise RuleError(f"{self.place(name)}: calls itself; a rule that is printed has a loop instead")
+            self.begun.add(name)
             self.parse_blocks()
             tree = self.trees[name]
             arguments = dict(zip([each.arg for each in tree.args.args], types, strict=True))
@@ -143,8 +148,9 @@ class _Body(ast.NodeVisitor):
         self.returned: str | None = None
         self.temporaries, self.depth = 0, 1
         # In C a variable may not hide a function that its own block calls, and a record that came by a
-        # pointer is copied before it is set: both go under another name.
-        self.written = {each: f"{each}_" for each in {*arguments, *self.tree_targets()} & MATHS}
+        # pointer is copied before it is set: both go under another name, which no third one has.
+        names = {*arguments, *self.tree_targets()}
+        self.written = {each: f"{each}_" for each in names if each in MATHS or each.endswith("_")}
         self.copied = {each for each in self.tree_targets() if arguments.get(each, REAL) not in (REAL, WHOLE)}
         self.written |= {each: f"{each}_" for each in self.copied}
         self.read = {
@@ -245,6 +251,8 @@ class _Body(ast.NodeVisitor):
         return [*lines, "}"]
 
     def visit_While(self, node: ast.While) -> list[str]:
+        if node.orelse:
+            self.refuse(node, "has an else behind a loop; write it behind the loop, with an if")
         return [f"while ({self.truth(node.test)}) {{", *self.block(node.body, self.depth + 1), "}"]
 
     def visit_For(self, node: ast.For) -> list[str]:
@@ -252,13 +260,16 @@ class _Body(ast.NodeVisitor):
         ends = [self.visit(each) for each in call.args] if call is not None else []
         if not 1 <= len(ends) <= 2 or {kind for kind, _ in ends} != {WHOLE} or not isinstance(node.target, ast.Name):
             self.refuse(node, "has a loop that is not printed; write for k in range(...)")
+        if node.orelse:
+            self.refuse(node, "has an else behind a loop; write it behind the loop, with an if")
         first, last = ["0", *(text for _, text in ends)][-2:]
-        # As in Python the variable keeps the value of the last turn, so the loop counts by another one.
-        turn = self.temporary()
+        # As in Python the variable keeps the value of the last turn, and the end is that of the first one,
+        # so the loop counts by others.
+        turn, end = self.temporary(), self.temporary()
         self.depth += 1
         taken = self.set(node.target.id, WHOLE, turn)
         self.depth -= 1
-        return [f"for (int {turn} = {first}; {turn} < {last}; {turn}++) {{", f"  {taken}",
+        return [f"for (int {turn} = {first}, {end} = {last}; {turn} < {end}; {turn}++) {{", f"  {taken}",
                 *self.block(node.body, self.depth + 1), "}"]  # fmt: skip
 
     def visit_Return(self, node: ast.Return) -> list[str]:
@@ -268,7 +279,7 @@ class _Body(ast.NodeVisitor):
         if kind == WHOLE and self.returned == REAL:
             kind, text = REAL, f"(real)({text})"
         if self.returned not in (None, kind):
-            self.refuse(node.value, f"returns {self.returned} at one place and {kind} at another")
+            self.refuse(node.value, f"returns {self.returned} at one place and {kind} at another; write 1.0, not 1")
         self.returned = kind
         return [f"return {text};"]
 
@@ -318,9 +329,13 @@ class _Body(ast.NodeVisitor):
         return str(text)
 
     def visit_Constant(self, node: ast.Constant) -> tuple[str, str]:
-        if isinstance(node.value, int):  # True and False, too
+        if isinstance(node.value, int) and node.value < 2**31:  # True and False, too
             return WHOLE, str(int(node.value))
-        return (REAL, f"R({node.value!r})") if isinstance(node.value, float) else self.generic_visit(node)
+        if not isinstance(node.value, float):
+            self.generic_visit(node)
+        if not fits_float(node.value):
+            self.refuse(node, f"{node.value!r} is no number of single precision")
+        return REAL, f"R({node.value!r})"
 
     def visit_Name(self, node: ast.Name) -> tuple[str, str]:
         return (self.types[node.id], self.c_name(node.id)) if node.id in self.types else self.generic_visit(node)
@@ -394,23 +409,38 @@ class _Body(ast.NodeVisitor):
             given = [self.truth(each) if method in DRAWS else self.real(each) for each in node.args[1:]]
             return REAL, f"percept->{method}({', '.join(['percept->context', *given])})"
         if name in own.structs:
-            kinds = zip(node.args, own.structs[name].values(), strict=True)
+            kinds = zip(self.in_order(node, list(own.structs[name])), own.structs[name].values(), strict=True)
             given = [self.real(each) if kind == REAL else self.value(each)[1] for each, kind in kinds]
             return name, f"({name}){{{', '.join(given)}}}"
         if name not in own.trees:
             self.refuse(node, f"calls {name}, which has no form in C; of math.h there are {', '.join(sorted(MATHS))}")
-        types = [self.visit(each)[0] for each in node.args]
+        arguments = own.trees[name].args
+        values = self.in_order(node, [each.arg for each in arguments.args], arguments.defaults)
+        types = [self.visit(each)[0] for each in values]
         if name in own.functions:  # a whole number may be handed where a number is expected
             known = own.functions[name].arguments.values()
             types = [REAL if (want, kind) == (REAL, WHOLE) else kind for want, kind in zip(known, types, strict=True)]
         found = own.called(name, types)
-        return found.returned, f"{name}({', '.join(self.passed(each) for each in node.args)})"
+        return found.returned, f"{name}({', '.join(self.passed(each) for each in values)})"
+
+    def in_order(self, node: ast.Call, names: list[str], defaults: Sequence[ast.expr] = ()) -> list[ast.expr]:
+        """Return the values of a call in the order of the names; those by keyword and by default, too."""
+        values = dict(zip(names[len(names) - len(defaults) :], defaults, strict=True))
+        values |= dict(zip(names, node.args, strict=False)) | {str(each.arg): each.value for each in node.keywords}
+        if len(node.args) > len(names) or set(values) != set(names):
+            self.refuse(node, f"{ast.unparse(node)} needs {', '.join(names)}, each once")
+        return [values[each] for each in names]
 
     def passed(self, node: ast.expr) -> str:
         """Return an argument as C: a record by its address."""
         kind, text = self.visit(node)
         given = kind in (REAL, WHOLE) or (isinstance(node, ast.Name) and self.pointed(node.id))
         return str(text) if given else f"&{text}"
+
+
+def fits_float(number: float) -> bool:
+    """Return True if a number is zero, or none that becomes zero or infinite in single precision."""
+    return number == 0.0 or 1.2e-38 < abs(number) < 3.4e38
 
 
 def _read(target: ast.expr) -> ast.expr:
