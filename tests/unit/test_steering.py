@@ -12,7 +12,7 @@ from airflock.core import Own
 from airflock.drones.onboard.card import CardError, card_hash, parse_card
 from airflock.fleets.card_document import make_card_document
 from airflock.parts import BODIES
-from airflock.parts.steering import STEERING, Parameters, law_for_command
+from airflock.parts.steering import NO_LIMIT, STEERING, Parameters, law_for_command
 from airflock.support import RuleError, ScenarioError
 from scenarios_drawn import Draw
 
@@ -23,27 +23,48 @@ def flown(law, body, **more):
     return airflock.load("vasarhelyi_2018/4ms", settings, law=law)
 
 
+def converted(rule, command, **given):
+    """A command as a rule converts it."""
+    values = given | dict(zip(("cx", "cy", "cz"), command, strict=True))
+    return rule(*(values[name] for name in rule.__code__.co_varnames[: rule.__code__.co_argcount]))
+
+
 @pytest.mark.parametrize(
     ("pair", "rule"), STEERING.items(), ids=lambda value: "-".join(value) if isinstance(value, tuple) else ""
 )
 def test_a_conversion_there_and_back_is_the_command_itself(pair, rule):
-    own, steer = Own(1.0, 2.0, 0.0, 0.4472135954999579, 0.8944271909999159, 0.0), Parameters(speed=4.0, response=0.5)
+    own, steer = (
+        Own(1.0, 2.0, 0.0, 0.4472135954999579, 0.8944271909999159, 0.0),
+        Parameters(speed=4.0, turn=NO_LIMIT, response=0.5),
+    )
     back = STEERING[pair[::-1]]
     command = {"heading": (0.6, 0.8, 0.0), "velocity": (2.4, 3.2, 0.0), "acceleration": (1.0, -1.0, 0.0)}[pair[0]]
     given = {"own": own, "period": 0.1, "steer": steer}
 
-    def call(function, c):
-        names = function.__code__.co_varnames[: function.__code__.co_argcount]
-        values = given | dict(zip(("cx", "cy", "cz"), c, strict=True))
-        return function(*(values[name] for name in names))
-
-    again = call(back, call(rule, command))
+    again = converted(back, converted(rule, command, **given), **given)
     if "heading" not in pair or pair[0] == "heading":
         assert again == pytest.approx(command, abs=1e-6)
     else:  # a heading keeps the direction of what was wanted, and no more
         wanted = np.array(command) if pair[0] == "velocity" else np.array(own[:3]) + 0.5 * np.array(command)
         found = np.array(again) if pair[0] == "velocity" else np.array(own[:3]) + 0.5 * np.array(again)
         assert found / np.linalg.norm(found) == pytest.approx(wanted / np.linalg.norm(wanted), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("pair", "rule"), STEERING.items(), ids=lambda value: "-".join(value) if isinstance(value, tuple) else ""
+)
+def test_a_conversion_is_the_same_in_other_units(pair, rule):
+    """Lengths in feet and times in minutes: no number is hidden in a rule."""
+    length, time = 1.0 / 0.3048, 1.0 / 60.0
+    factor = {"heading": 1.0, "velocity": length / time, "acceleration": length / time**2}
+    own, p = Own(1.0, 2.0, 0.5, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0), Parameters(speed=3.0, turn=0.4, response=0.5)
+    command = {"heading": (0.6, 0.8, 0.0), "velocity": (2.4, -3.2, 1.0), "acceleration": (1.0, -1.0, 0.3)}[pair[0]]
+    v = factor["velocity"]
+    scaled = Parameters(speed=3.0 * v, turn=0.4 / time, response=0.5 * time)
+    there = Own(1.0 * v, 2.0 * v, 0.5 * v, *own[3:])
+    here = converted(rule, command, own=own, period=0.1, steer=p)
+    again = converted(rule, [c * factor[pair[0]] for c in command], own=there, period=0.1 * time, steer=scaled)
+    assert again == pytest.approx([c * factor[pair[1]] for c in here], rel=1e-6)
 
 
 def test_a_heading_turns_by_at_most_the_largest_rate():

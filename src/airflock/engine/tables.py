@@ -76,7 +76,7 @@ def driver_records(scenario: Scenario, period: float) -> dict[str, Any]:
     derived = {
         "w": driver_geometry(scenario), "c": StepTimes(scenario.flight.dt, period), "air": dryden.numbers_of(a),
         "a": wind.Steady(a.east, a.north, a.up, a.gust, a.gust_time), "silence": scenario.resolved_silence(),
-        "steer": scenario.resolved_steer(),
+        "steer": scenario.resolved_steer() if scenario.steers else scenario.steer,
     }  # fmt: skip
     found = {each.letter: derived.get(each.letter, records[each.key]) for each in ORDER if each.letter}
     return found | {f"p{k}": law.parameters for k, law in enumerate(scenario.laws) if k}

@@ -14,6 +14,7 @@ from typing import Any
 from airflock.core import Model, Parameters as Record, arc_cosine, norm, quantity, shorten, steered_law
 
 OURS = "our choice"
+NO_LIMIT = 1e6  # rad/s, in whatever units a flight counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,12 +26,12 @@ class Parameters(Record):
         meaning="speed of a heading, and largest speed of an acceleration; by default the law's preferred speed, "
         "else that of the fitness",
     )  # fmt: skip
-    turn: float = quantity(
-        1e6, "rad/s", low=0.0, high=1e6, source=OURS,
-        meaning="largest rate of turn of a heading; the default is no limit",
+    turn: float | None = quantity(
+        None, "rad/s", low=0.0, high=1e6, source=OURS,
+        meaning="largest rate of turn of a heading; by default there is no limit",
     )  # fmt: skip
     response: float | None = quantity(
-        None, "s", low=1e-6, high=60.0, source=OURS,
+        None, "s", low=1e-6, high=1e7, source=OURS,
         meaning="time in which the body follows a command; by default body.tau where the body has it, else the period "
         "of decisions",
     )  # fmt: skip

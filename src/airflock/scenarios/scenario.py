@@ -345,7 +345,8 @@ class Scenario:
         """Return how commands are converted, open numbers derived from the law, the fitness and the body."""
         speed = self.resolved_metrics().v_flock if self.steer.speed is None else self.steer.speed
         response = getattr(self.body.numbers, "tau", self.sensors.period or self.flight.dt)
-        return replace(self.steer, speed=speed, response=self.steer.response or response)
+        turn = steering.NO_LIMIT if self.steer.turn is None else self.steer.turn
+        return replace(self.steer, speed=speed, turn=turn, response=self.steer.response or response)
 
     def resolved_silence(self) -> SilenceParameters:
         """Return the rule of silence, open numbers derived from the rest of the scenario."""

@@ -22,6 +22,7 @@ from airflock.core import (
     SilenceParameters,
     State,
     choice,
+    number_names,
     quantity,
 )
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot, ParameterCheck
@@ -514,7 +515,7 @@ def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard |
         errors.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
     laws = [each for each in (law, *(row[0] for row in own)) if each is not None]
     if steer is not None and any(each.steer for each in laws):
-        errors += [f"steer.{key} is missing" for key in ("speed", "response") if getattr(steer, key) is None]
+        errors += [f"steer.{key} is missing" for key in number_names(steer) if getattr(steer, key) is None]
     if errors or law is None:
         return None
     place = WorldMap(
