@@ -1,6 +1,7 @@
 """Any law flies any robot: commands are converted where the body takes another kind than the law gives."""
 
 import math
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -11,7 +12,7 @@ from against_reference import compared
 from airflock.core import Own
 from airflock.drones.onboard.card import CardError, card_hash, parse_card
 from airflock.fleets.card_document import make_card_document
-from airflock.parts import BODIES
+from airflock.parts import BODIES, SENSORS
 from airflock.parts.steering import NO_LIMIT, STEERING, Parameters, law_for_command
 from airflock.support import RuleError, ScenarioError
 from scenarios_drawn import Draw
@@ -142,6 +143,35 @@ def test_a_note_names_the_speed_at_which_a_converted_law_flies():
         recording = airflock.simulate(scenario, seed=1, device="python")
         speeds = np.linalg.norm(recording["velocity"].values[-1], axis=0)
         assert float(np.median(speeds)) == pytest.approx(named, rel=0.1)
+
+
+class Crawl:
+    COMMAND, preferred_speed = "heading", lambda p: p.pace
+
+    @dataclass(frozen=True, kw_only=True)
+    class Parameters(airflock.Parameters):
+        pace: float = airflock.quantity(2.0, "m/s", low=0.0, high=9.0, meaning="preferred speed")
+
+    def decide(own):
+        return own.hx, own.hy, own.hz
+
+
+def test_the_speed_of_a_converted_heading_is_the_one_that_the_fitness_expects():
+    for law in ("couzin_2002", airflock.model(Crawl)):
+        scenario = airflock.load("vasarhelyi_2018/8ms", law=law)
+        assert scenario.resolved_steer().speed == scenario.resolved_metrics().v_flock
+    assert scenario.resolved_steer().speed == 2.0
+
+
+@pytest.mark.parametrize("unsound", ["", "agents = 1000000\n", "[model]\np_repp = 3.0\n"])
+def test_the_robot_stays_where_a_file_needs_the_callers_parts_and_settings(unsound, tmp_path):
+    """Another law on a file that does not fly by itself: its body is still that of the file."""
+    file = tmp_path / "mine.toml"
+    file.write_text(f'extends = "vasarhelyi_2018/8ms"\n{unsound}')
+    own = replace(next(iter(SENSORS.values())), name="own")
+    scenario = airflock.load(file, {"agents": 9}, law="couzin_2002", sensor=own)
+    assert scenario.body.rule.name == "multirotor"
+    assert scenario.resolved_steer().speed == (1.0 if "p_repp" in unsound else 8.0)
 
 
 def test_a_law_on_a_body_that_takes_its_command_is_not_steered():

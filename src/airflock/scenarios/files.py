@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from airflock.core import Fault, Kind, PacketParameters, fault, number_names, without_replaced
+from airflock.parts import default_body
 from airflock.scenarios import formats, schema
-from airflock.scenarios.named_code import law_from_caller
-from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, kept_keys, part_from_caller
+from airflock.scenarios.named_code import find_law, law_from_caller
+from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, kept_keys, model_table, part_from_caller
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.scenarios.schema import value_of
@@ -155,7 +156,7 @@ def load(
         errors.notes += [f"extends {base}: what is not given here is taken from there"] if base else []
         document, settings = with_field(document, settings_dict(settings, where), folder, errors)
         if own_law is not None:
-            document = _with_robot_of(document, where, folder, trust)
+            document = _with_robot_of(document, where, settings, folder, caller_parts, trust)
             kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else own_law.name
             document = {**document, "model": {"kind": kind}, "published": {}}
         return build_scenario(
@@ -163,14 +164,31 @@ def load(
         )
 
 
-def _with_robot_of(document: dict[str, Any], where: str, folder: Path | None, trust: bool) -> dict[str, Any]:
-    """Return a document that names the body and the preferred speed of its law, for another law that flies the same."""
+def _with_robot_of(
+    document: dict[str, Any], where: str, settings: Mapping[str, Any], folder: Path | None, parts: CallerParts,
+    trust: bool,
+) -> dict[str, Any]:  # fmt: skip
+    """Return a document for the caller's law that names the body of the one which it replaces, and its preferred speed.
+
+    The speed counts only where the caller's law prefers none.
+    """
+    assert parts.law is not None
+    body, steer = document.get("body", {}), document.get("steer", {})
+    # What is set for the law or the body is meant for those that fly.
+    others = {key: value for key, value in settings.items() if not key.startswith(("model.", "body.", "steer."))}
     try:
-        before = build_scenario(document, where, folder=folder, trust=trust)
+        before = build_scenario(
+            document, where, others, folder=folder, caller_parts=replace(parts, law=None), trust=trust
+        )
     except AirflockError:
-        return document  # what is wrong with it is said with the new law
-    speed, steer = before.model.speed(before.parameters), document.get("steer", {})
-    body = {"kind": before.body.rule.name, **document.get("body", {})}
+        # What is wrong is said with the new law; but a body that is not named is that of the old one.
+        try:
+            usual = default_body(find_law(model_table(document)[0].get("kind"), folder, trust=trust).command)
+        except AirflockError:
+            return document
+        return {**document, "body": {"kind": usual, **body}} if isinstance(body, Mapping) else document
+    speed = 0.0 if parts.law.preferred_speed is not None else before.model.speed(before.parameters)
+    body = {"kind": before.body.rule.name, **body}
     return {**document, "body": body, "steer": {"speed": speed, **steer} if speed else steer}
 
 
