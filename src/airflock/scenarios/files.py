@@ -12,7 +12,7 @@ from airflock.core import Fault, Kind, PacketParameters, fault, number_names, wi
 from airflock.parts import default_body
 from airflock.scenarios import formats, schema
 from airflock.scenarios.named_code import find_law, law_from_caller
-from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, kept_keys, model_table, part_from_caller
+from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, kept_keys, part_from_caller
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.scenarios.schema import value_of
@@ -173,7 +173,7 @@ def _with_robot_of(
     The speed counts only where the caller's law prefers none.
     """
     assert parts.law is not None
-    body, steer = document.get("body", {}), document.get("steer", {})
+    model, body, steer = (document.get(section, {}) for section in ("model", "body", "steer"))
     # What is set for the law or the body is meant for those that fly.
     others = {key: value for key, value in settings.items() if not key.startswith(("model.", "body.", "steer."))}
     try:
@@ -182,8 +182,9 @@ def _with_robot_of(
         )
     except AirflockError:
         # What is wrong is said with the new law; but a body that is not named is that of the old one.
+        kind = model.get("kind") if isinstance(model, Mapping) else None
         try:
-            usual = default_body(find_law(model_table(document)[0].get("kind"), folder, trust=trust).command)
+            usual = default_body(find_law(kind, folder, trust=trust).command)
         except AirflockError:
             return document
         return {**document, "body": {"kind": usual, **body}} if isinstance(body, Mapping) else document
