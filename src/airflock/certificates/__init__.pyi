@@ -10,6 +10,10 @@ from .campaign import (
     tolerance_keys as tolerance_keys,
     used_and_unused_keys as used_and_unused_keys,
 )
+from .causes import (
+    WhyResult as WhyResult,
+    why as why,
+)
 from .certificate import (
     Certificate as Certificate,
     check_certificate as check_certificate,

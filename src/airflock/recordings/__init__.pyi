@@ -53,6 +53,7 @@ from .recording_files import (
     load_recording as load_recording,
     replay_recording as replay_recording,
     save as save,
+    scenario_to_fly_again as scenario_to_fly_again,
 )
 from .scores import (
     PAIR_METRICS as PAIR_METRICS,

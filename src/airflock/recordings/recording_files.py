@@ -118,21 +118,10 @@ def replay_recording(
 ) -> tuple[bool, list[str]]:
     """Fly a simulated recording again from its attributes.
 
-    law      : where it was flown with a law of the user's own, that law (a module, a mapping, a Model, or its file)
-    settings : where it was flown with a body, metrics, ... of the user's own, their files: {"metrics.kind": "mine.py"}
-    trust    : whether these files may run
+    law, settings, trust : as of `scenario_to_fly_again`
     Returns whether all positions have the same bits, and what differs between then and now that could explain it.
     """
-    document = attributes.scenario_document(recording)
-    if document is None or not attributes.read_integer(recording, "random_start", 1):
-        raise RecordingError("recording: was not flown from a scenario and a seed, so it cannot be flown again")
-    own = law_from_caller(law) if law is not None else None
-    _refuse_missing_laws(recording, document, own)
-    # A flight is replayed exactly or not at all, so stand-ins for missing code are refused here.
-    require_user_files(document, settings or {})
-    document, _ = with_user_files(document, settings or {})
-    name = str(recording.attrs.get("airflock_name", "recording"))
-    scenario = build_scenario(document, name, caller_parts=CallerParts(law=own), trust=trust)
+    scenario = scenario_to_fly_again(recording, law, settings, trust=trust)
     seed = attributes.read_integer(recording, "airflock_seed")
     precision = attributes.read_integer(recording, "airflock_precision", 32)
     again = simulate(
@@ -146,6 +135,27 @@ def replay_recording(
         np.array_equal(again["position"].values, recording["position"].values, equal_nan=True)
     )
     return same, _differences(recording, scenario, provenance(scenario, seed, precision))
+
+
+def scenario_to_fly_again(
+    recording: xr.Dataset, law: Any = None, settings: Mapping[str, Any] | None = None, *, trust: bool = False
+) -> Scenario:
+    """Return the scenario that a simulated recording was flown with, or raise RecordingError for what it lacks.
+
+    law      : where it was flown with a law of the user's own, that law (a module, a mapping, a Model, or its file)
+    settings : where it was flown with a body, metrics, ... of the user's own, their files: {"metrics.kind": "mine.py"}
+    trust    : whether these files may run
+    """
+    document = attributes.scenario_document(recording)
+    if document is None or not attributes.read_integer(recording, "random_start", 1):
+        raise RecordingError("recording: was not flown from a scenario and a seed, so it cannot be flown again")
+    own = law_from_caller(law) if law is not None else None
+    _refuse_missing_laws(recording, document, own)
+    # A flight is replayed exactly or not at all, so stand-ins for missing code are refused here.
+    require_user_files(document, settings or {})
+    document, _ = with_user_files(document, settings or {})
+    name = str(recording.attrs.get("airflock_name", "recording"))
+    return build_scenario(document, name, caller_parts=CallerParts(law=own), trust=trust)
 
 
 def _refuse_missing_laws(recording: xr.Dataset, document: Mapping[str, Any], own: Any) -> None:

@@ -1,0 +1,178 @@
+"""Why two agents met: causes that were planted are named first, and nothing is named where nothing matters."""
+
+import pytest
+
+import airflock
+from airflock.certificates import causes
+from airflock.parts import FAULTS, RADIOS, SENSORS
+from airflock.scenarios import presets, with_settings
+
+SMALL = {
+    "agents": 6, "duration": 120.0, "world.side": 70.0, "sensors.kind": "perfect", "body.noise": 0.05,
+    "radio.delay": 0.2,
+}  # fmt: skip
+GAS = {"model.p_rep": 0.0, "model.c_frict": 0.0}  # agents that no rule keeps apart: the radio is not read
+FUTURES = 60
+
+
+def small(**keys):
+    return airflock.load("vasarhelyi_2018/4ms", SMALL | keys)
+
+
+def with_fault(kind, **numbers):
+    return small(faults=[{"kind": kind, "agents": [0], "at": 20.0, **numbers}])
+
+
+def line_of(request):
+    """The error of a request, which is one line."""
+    with pytest.raises(airflock.AirflockError) as error:
+        request()
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def hits(scenario, count):
+    """The first seeds whose flights have a collision, and none without what was planted."""
+    events, without = (airflock.score(each, seeds=range(20))["n_coll"] for each in (scenario, small()))
+    return [seed for seed in range(20) if events[seed] > 0 and without[seed] == 0][:count]
+
+
+PLANTED = {
+    "silent radio": (lambda: with_fault("radio_silent"), "faults[0]"),
+    "offset of a receiver": (lambda: with_fault("gnss_offset", east=12.0), "faults[0]"),
+    "frozen receiver": (lambda: with_fault("gnss_frozen"), "faults[0]"),
+    "late packets": (lambda: small(**{"radio.delay": 3.0}), "radio.delay"),
+}
+
+
+@pytest.mark.parametrize("planted", PLANTED)
+def test_a_planted_cause_is_named_first(planted):
+    make, name = PLANTED[planted]
+    for seed in hits(make(), 3):
+        found = airflock.why(make(), seed, futures=FUTURES)
+        assert found.causes and found.causes[0].without == name, (planted, seed, found.text)
+        assert f"in {found.causes[0].events} of {FUTURES} futures instead of" in found.text
+
+
+def test_what_no_rule_reads_changes_no_future_and_is_no_cause():
+    gas = small(**GAS, **{"radio.delay": 2.0, "body.noise": 0.4})
+    for seed in range(6):
+        found = airflock.why(gas, seed, futures=FUTURES, interventions=["radio.delay"])
+        rows = {(row.lead, row.without): row.events for row in found.rows}
+        assert all(events == rows[lead, "nothing"] for (lead, _), events in rows.items()), seed
+        assert found.causes == [] and found.avoidable_until is None
+        assert "no cause is shown" in found.text.lower()
+
+
+def test_a_flight_of_a_scenario_without_perturbations_has_nothing_to_take_away():
+    calm = airflock.load("vicsek_1995/ordered", {"agents": 4})
+    assert causes.declared_interventions(calm) == {}
+
+
+def test_futures_are_the_same_whatever_the_threads_and_differ_between_seeds_of_flights():
+    scenario = with_fault("radio_silent")
+    first, second = hits(scenario, 2)
+    one, two = (airflock.why(scenario, first, futures=FUTURES, threads=threads) for threads in (1, 2))
+    assert one.rows == two.rows and one.document() == two.document()
+    assert airflock.why(scenario, second, futures=FUTURES).rows != one.rows
+
+
+def test_a_recording_is_explained_as_its_flight_and_a_changed_one_is_refused(tmp_path):
+    scenario = with_fault("radio_silent")
+    seed = hits(scenario, 1)[0]
+    recording = airflock.simulate(scenario, seed)
+    options = {"futures": 10, "leads": [4.0], "interventions": ["faults[0]"]}
+    file = airflock.save(recording, tmp_path / "flight.nc")
+    assert airflock.why(file, **options).rows == airflock.why(scenario, seed, **options).rows
+    recording["position"][5] += 0.01
+    assert "it is another flight" in line_of(lambda: airflock.why(recording, **options))
+
+
+def test_a_fault_that_was_begun_by_hand_is_a_cause_of_the_recorded_flight():
+    scenario, flight = small(), None
+    for seed in range(20):
+        flight = airflock.open(scenario, seed, record=True).advance(20.0).fault("radio_silent", 0)
+        flight.finish()
+        if sum(part["n_coll"] for part in (*(w.scores for w in flight.windows), flight.scores())) > 0:
+            break
+    found = airflock.why(airflock.recording_of(flight), futures=FUTURES, leads=[4.0])
+    assert found.time > 20.0 and found.causes[0].without == "faults[0]", (seed, found.text)
+
+
+def test_noise_that_a_recorded_flight_drew_anew_later_does_not_bind_its_futures():
+    scenario = with_fault("radio_silent")
+    flight = airflock.open(scenario, hits(scenario, 1)[0], record=True)
+    flight.advance(10.0).event("branch", world=7).finish()
+    flown = causes._flown_flight(airflock.recording_of(flight), None, None, None, None, False)
+    for until, world in ((500, 0), (1500, 7)):  # s 5 and 15 at 0.01 s
+        start = flown.open(until, fresh=True)
+        assert start.world == world and start.branch(5).advance(10.0).world == 5
+
+
+KINDS = (
+    [{"radio.kind": kind} for kind in RADIOS]
+    + [{"sensors.kind": kind} for kind in SENSORS]
+    + [{"faults": [{"kind": kind, "at": 1.0, "agents": [1]}, {"kind": "motor", "per_hour": 2.0}]} for kind in FAULTS]
+    + [{"wind.kind": kind, "wind.east": 2.0, "wind.gust": 1.0} for kind in ("simple", "dryden")]
+    + [{"groups": [{"name": "a", "agents": 2, "sensors": {"noise": 0.1}, "body": {"tau": 2.0, "noise": 0.4}}]}]
+)
+
+
+@pytest.mark.parametrize("keys", KINDS, ids=str)
+def test_what_is_taken_away_is_no_longer_there_for_every_kind_of_part(keys):
+    scenario = airflock.load("vasarhelyi_2018/real_4ms", {"agents": 4} | keys)
+    for name, settings in causes.declared_interventions(scenario).items():
+        without = with_settings(scenario, settings)
+        left = causes.declared_interventions(without)
+        if name == "body.tau":
+            assert without.body.tau == 0.5 * scenario.body.tau
+        else:
+            assert name not in left, (keys, name)
+        # Numbers of entries stay, by which other faults are drawn.
+        assert len(without.faults) == len(scenario.faults)
+        assert set(causes.declared_interventions(scenario)) - {name} <= set(left) | {"body.tau"}
+
+
+def test_every_preset_can_fly_on_without_what_it_declares():
+    for name in presets():
+        scenario = airflock.load(name)
+        for settings in causes.declared_interventions(scenario).values():
+            with_settings(scenario, settings)
+
+
+def test_equal_faults_go_together():
+    twice = small(faults=[{"kind": "motor", "per_hour": 9.0}] * 2 + [{"kind": "stuck", "per_hour": 9.0}])
+    found = causes.declared_interventions(twice)
+    assert [name for name in found if name.startswith("faults")] == ["faults[0]", "faults[2]"]
+    assert [entry.at for entry in with_settings(twice, found["faults[0]"]).faults] == [1e6, 1e6, None]
+
+
+def test_a_contact_with_the_world_is_an_event_too():
+    blind = small(**GAS, **{"model.v_shill": 0.0})
+    found = airflock.why(blind, 1, event="world", futures=10, leads=[1.0], interventions=["radio.delay"])
+    assert "touched a wall" in found.event and found.agents == ()
+    assert [row.events for row in found.rows] == [10, 10]  # nothing turns them, so all of them touch it
+
+
+def test_faulty_requests_are_refused_in_a_line():
+    scenario, safe = with_fault("radio_silent"), small(duration=5.0)
+    seed = hits(scenario, 1)[0]
+    lines = {
+        "nothing to explain; the smallest distance was": lambda: airflock.why(safe, 0),
+        "seed: is needed": lambda: airflock.why(scenario),
+        "interventions: radio.dely: unknown; this flight has radio.delay, ": lambda: airflock.why(
+            scenario, seed, interventions=["radio.dely"]
+        ),
+        "interventions = 'radio.delay' is no list": lambda: airflock.why(scenario, seed, interventions="radio.delay"),
+        "event = 'pairs': did you mean pair?": lambda: airflock.why(scenario, seed, event="pairs"),
+        "limit = 0.0 m lies outside (0, 1000] m": lambda: airflock.why(scenario, seed, limit=0.0),
+        "leads = [0.0] is no list of times": lambda: airflock.why(scenario, seed, leads=[0.0]),
+        "leads = 4.0 is no list of times": lambda: airflock.why(scenario, seed, leads=4.0),
+        "futures = 3 is not a whole number within [10, ": lambda: airflock.why(scenario, seed, futures=3),
+        "budget = 0 is no time above 0 s": lambda: airflock.why(scenario, seed, budget=0),
+        "it happens at the start": lambda: airflock.why(scenario, seed, limit=500.0),
+        "one agent meets nobody": lambda: airflock.why(small(agents=1), 0),
+    }
+    for text, request in lines.items():
+        line = line_of(request)
+        assert text in line, (text, line)
