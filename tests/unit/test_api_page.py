@@ -108,7 +108,9 @@ QUIET = {  # raise none of ours: neither their source nor their docstring shows 
     "airflock.presets", "airflock.plots.convergence", "airflock.Scenario.with_drawn_scene",
     "airflock.Scenario.separation",
     "airflock.Flight.scores", "airflock.Flight.snapshot", "airflock.Flight.compile",
-    "airflock.search.study_result.EvolveResult.document",
+    "airflock.search.study_result.EvolveResult.document", "airflock.certificates.causes.WhyResult.document",
+    "airflock.certificates.causes.WhyResult.text", "airflock.certificates.causes.WhyResult.table",
+    "airflock.certificates.causes.WhyResult.causes", "airflock.certificates.causes.WhyResult.avoidable_until",
 }  # fmt: skip
 
 

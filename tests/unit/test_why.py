@@ -1,6 +1,9 @@
 """Why two agents met: causes that were planted are named first, and nothing is named where nothing matters."""
 
+from io import StringIO
+
 import pytest
+from rich.console import Console
 
 import airflock
 from airflock.certificates import causes
@@ -74,6 +77,10 @@ def test_futures_are_the_same_whatever_the_threads_and_differ_between_seeds_of_f
     first, second = hits(scenario, 2)
     one, two = (airflock.why(scenario, first, futures=FUTURES, threads=threads) for threads in (1, 2))
     assert one.rows == two.rows and one.document() == two.document()
+    shown = StringIO()
+    Console(file=shown, width=120).print(one)
+    for text in (shown.getvalue(), one._repr_html_(), repr(one)):  # each shows the sentence
+        assert one.event.split("(")[0] in text
     assert airflock.why(scenario, second, futures=FUTURES).rows != one.rows
 
 

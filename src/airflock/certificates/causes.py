@@ -36,8 +36,11 @@ from airflock.support import (
     FlightError,
     RecordingError,
     ScenarioError,
+    format_cell,
     holm_correction,
     is_number,
+    result_group,
+    result_table,
     run_in_threads,
     suggest,
 )
@@ -67,11 +70,11 @@ Settings = dict[str, Any]
 def declared_interventions(scenario: Scenario) -> dict[str, Settings]:
     """Return what can be taken away from a flight of a scenario: name → keys to change."""
     radio, wind, body = scenario.radio.numbers, scenario.wind, scenario.body.numbers
-    late = {f"radio.{key}": 0.0 for key in ("delay", "jitter") if getattr(radio, key, 0.0)}
-    lost = {f"radio.{key}": 0.0 for key in LOSSES if getattr(radio, key, 0.0)}
+    late: Settings = {f"radio.{key}": 0.0 for key in ("delay", "jitter") if getattr(radio, key, 0.0)}
+    lost: Settings = {f"radio.{key}": 0.0 for key in LOSSES if getattr(radio, key, 0.0)}
     if scenario.radio.rule.keeps_packets:  # else nothing reads these
         lost |= {f"radio.{key}": 1.0 for key, v in vars(radio).items() if key.startswith("received") and v < 1.0}
-    blows = {f"wind.{key}": 0.0 for key in ("east", "north", "up", "gust") if getattr(wind, key)}
+    blows: Settings = {f"wind.{key}": 0.0 for key in ("east", "north", "up", "gust") if getattr(wind, key)}
     blows |= {"wind.kind": "simple", "wind.gust": 0.0} if wind.kind == "dryden" else {}
     found: dict[str, Settings] = {"radio.delay": late, "radio.loss": lost, "wind": blows, "sensors": {}}
     if scenario.has_sensor_error:
@@ -215,6 +218,22 @@ class WhyResult:
     def __repr__(self) -> str:
         return f"<Why in {self.scenario.name}, seed {self.seed}: {self.text}>"
 
+    def __rich__(self) -> Any:
+        """Return sentence, table and notes, for a terminal."""
+        rows = [
+            (
+                f"{row.lead:g}",
+                self._label(row.without),
+                f"{row.events} of {row.futures}",
+                f"{row.low:.2f} to {row.high:.2f}",
+                format_cell(row.p_value, ""),
+                "yes" if row.is_named else "",
+            )
+            for row in self.rows
+        ]
+        table = result_table("", ">s before; without; >events; >95 % interval; >p; cause", rows)
+        return result_group(self.text, table, *self.notes)
+
     def _repr_html_(self) -> str:
         """Return sentence and table, for a notebook."""
         notes = "".join(f"<li>{escape(note)}</li>" for note in self.notes)
@@ -264,7 +283,7 @@ def why(
     Parameters
     ----------
     scenario : Scenario, str, path or xarray.Dataset
-        What flew, with its seed; or a recording of a simulated flight, or its file (.nc).
+        What flew, with its seed; or a recording, as `airflock.simulate` returns it, or its file (.nc).
     seed : int, optional
         Of the flight; a recording holds its own.
     event : str
@@ -468,7 +487,8 @@ class _Ensembles:
         self.ends = np.inf if self.budget is None else time.monotonic() + self.budget
         for lead in leads:
             taken = {name: each for name, each in known[lead].items() if chosen is None or name in chosen}
-            for name, settings in ({NOTHING: {}} | taken).items():
+            self._fly(lead, NOTHING, {})
+            for name, settings in taken.items():
                 self._fly(lead, name, settings)
         if not self.outcomes:
             raise FlightError(f"budget = {self.budget:g} s is too short for {self.futures} futures; give more")
