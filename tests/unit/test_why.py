@@ -104,6 +104,7 @@ def test_a_fault_that_was_begun_by_hand_is_a_cause_of_the_recorded_flight():
             break
     found = airflock.why(airflock.recording_of(flight), futures=FUTURES, leads=[4.0])
     assert found.time > 20.0 and found.causes[0].without == "faults[0]", (seed, found.text)
+    assert "Without radio_silent (faults[0])" in found.text
 
 
 def test_noise_that_a_recorded_flight_drew_anew_later_does_not_bind_its_futures():

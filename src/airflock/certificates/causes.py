@@ -148,8 +148,14 @@ class WhyResult:
         for row in self.rows:
             if row.is_named and (row.without not in best or self._drop(row) > self._drop(best[row.without])):
                 best[row.without] = row
-        # Two together end more than one alone; what does it alone is said first.
-        return sorted(best.values(), key=lambda row: (TOGETHER in row.without, -self._drop(row)))
+
+        def rank(row: CauseRow) -> tuple[int, float, bool]:
+            # What disturbs is said before another body that would stand it, and what ends the event
+            # alone before two together; of equals a fault, as flights have the others at all times.
+            kind = 2 if TOGETHER in row.without else int(row.without == "body.tau")
+            return kind, -self._drop(row), not row.without.startswith("faults")
+
+        return sorted(best.values(), key=rank)
 
     @property
     def avoidable_until(self) -> float | None:
@@ -174,7 +180,9 @@ class WhyResult:
             said.append(f"{changed} {label} it would have happened in {many} (from {row.lead:g} s before).")
         if not self.causes:
             said.append(self._unexplained())
-        if self.avoidable_until is not None and (later := [r.lead for r in self.rows if r.lead < self.avoidable_until]):
+        last = self.avoidable_until
+        tried = [row.lead for row in self.rows if row.without != NOTHING]  # a budget may end before the last leads
+        if last is not None and (later := [lead for lead in tried if lead < last]):
             said.append(f"From {max(later):g} s before, nothing that was tried lowers it measurably.")
         return " ".join(said)
 
@@ -346,7 +354,8 @@ def why(
         notes.append(f"the event comes {time_of_event:g} s after the start: no future branches off earlier")
     ensembles = _Ensembles(flown, step, EVENTS[event], futures, threads, budget, notify, notes)
     rows = ensembles.fly(list(steps), interventions)
-    return WhyResult(flown.scenario, flown.seed, sentence, time_of_event, agents, rows, tuple(dict.fromkeys(notes)))
+    in_force = ensembles.bases[min(steps)].scenario  # with faults that were begun by hand
+    return WhyResult(in_force, flown.seed, sentence, time_of_event, agents, rows, tuple(dict.fromkeys(notes)))
 
 
 def _check_arguments(
