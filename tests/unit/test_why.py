@@ -2,6 +2,7 @@
 
 from io import StringIO
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -146,6 +147,23 @@ def test_every_preset_can_fly_on_without_what_it_declares():
         scenario = airflock.load(name)
         for settings in causes.declared_interventions(scenario).values():
             with_settings(scenario, settings)
+
+
+@pytest.mark.parametrize("name", ["vicsek_1995/ordered", "vasarhelyi_2018/4ms"])  # a periodic box, and one with walls
+def test_the_pair_that_met_is_the_nearest_one_of_all_also_across_edges_of_a_periodic_box(name):
+    rng = np.random.default_rng(5)
+    for case in range(20):
+        flight = airflock.open(airflock.load(name, {"agents": 5}), case, device="python")
+        side = flight.scenario.world.side
+        flight.place(list(range(5)), rng.uniform(-0.5, 0.5, (5, 2)) * side)
+        flight.remove(int(rng.integers(5)))
+        there, places = np.flatnonzero(flight.present), flight.state[:2].T
+        away = {(i, j): places[i] - places[j] for i in there for j in there if i < j}
+        if flight.scenario.world.edges == "periodic":
+            away = {pair: each - side * np.round(each / side) for pair, each in away.items()}
+        least = min(away, key=lambda pair: np.hypot(*away[pair]))
+        found, distance = causes._nearest_pair(flight)
+        assert found == least and distance == pytest.approx(np.hypot(*away[least]), rel=1e-5), case
 
 
 def test_equal_faults_go_together():

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 from scipy.stats import binomtest
 
 from airflock.certificates.limits import lower_bound
@@ -421,9 +422,11 @@ def _first_event(flown: _FlownFlight, event: str) -> tuple[int, float, tuple[int
         if event_count(flight, score) > 0:
             break
         if flight.over:
-            raise FlightError(
-                f"{flight.scenario.name}, seed {flown.seed}: nothing to explain; {_nearest(flight, event)}"
-            )
+            parts = (*(window.scores for window in flight.windows), flight.scores())
+            least = min(float(values["r_min"]) for values in parts)
+            near = f"the smallest distance was {least:.2g} m, and the limit is {scenario.metrics.r_coll:g} m"
+            near = near if event == "pair" else "no agent touched a wall, an obstacle or the scene"
+            raise FlightError(f"{scenario.name}, seed {flown.seed}: nothing to explain; {near}")
         before = flight.step
     flight = flown.open(before)
     while event_count(flight, score) == 0:
@@ -438,36 +441,24 @@ def _first_event(flown: _FlownFlight, event: str) -> tuple[int, float, tuple[int
     return flight.step, moment, agents, f"{near} at t = {moment:.2f} s ({distance:.2f} m)"
 
 
-def _nearest(flight: Flight, event: str) -> str:
-    """Say how near an event was."""
-    if event == "world":
-        return "no agent touched a wall, an obstacle or the scene"
-    least = min(float(values["r_min"]) for values in (*(w.scores for w in flight.windows), flight.scores()))
-    return f"the smallest distance was {least:.2g} m, and the limit is {flight.scenario.metrics.r_coll:g} m"
-
-
 def _nearest_pair(flight: Flight) -> tuple[tuple[int, int], float]:
     """Return the two agents that are nearest to each other now, and their distance, m."""
-    world, axes = flight.scenario.world, flight.scenario.dimensions
-    places = np.where(flight.present, flight.state[:axes].astype(float), np.nan)
-    least, found = np.inf, (0, 1)
-    for agent in range(flight.agents - 1):
-        away = places[:, agent + 1 :] - places[:, agent, None]
-        if world.edges == "periodic":
-            sides = 2.0 * np.array(half_sizes(world)[:axes])[:, None]
-            away -= sides * np.round(away / sides)
-        distances = np.sqrt((away**2).sum(axis=0))
-        if np.isfinite(distances).any() and np.nanmin(distances) < least:
-            least = float(np.nanmin(distances))
-            found = agent, agent + 1 + int(np.nanargmin(distances))
-    return found, least
+    world, axes, there = flight.scenario.world, flight.scenario.dimensions, np.flatnonzero(flight.present)
+    places = flight.state[:axes, there].T.astype(float)
+    sides = 2.0 * np.array(half_sizes(world)[:axes]) if world.edges == "periodic" else None
+    if sides is not None:
+        places = np.minimum(places % sides, np.nextafter(sides, 0.0))  # a tree takes [0, side) alone
+    distances, others = KDTree(places, boxsize=sides).query(places, k=2)
+    one = int(distances[:, 1].argmin())
+    first, second = sorted((int(there[one]), int(there[others[one, 1]])))
+    return (first, second), float(distances[one, 1])
 
 
 @dataclass
 class _Ensembles:
     """Futures of a flight: of each lead (steps) and intervention, which of them have the event.
 
-    outcomes : (lead, name) → (future,); settings : (lead, name) → keys that are changed
+    outcomes : (lead, name) → (future,); bases : lead → flight from which futures branch off
     """
 
     flown: _FlownFlight
@@ -479,7 +470,6 @@ class _Ensembles:
     notify: Callable[[str], None]
     notes: list[str]
     outcomes: dict[tuple[int, str], NDArray[np.bool_]] = field(default_factory=dict)
-    settings: dict[tuple[int, str], Settings] = field(default_factory=dict)
     bases: dict[int, Flight] = field(default_factory=dict)
     ends: float = np.inf
 
@@ -526,7 +516,6 @@ class _Ensembles:
                 raise
             self.notes.append(f"{name}: left out: {error}")
             return
-        self.settings[lead, name] = settings
         seconds, count = lead * self.flown.scenario.flight.dt, int(self.outcomes[lead, name].sum())
         self.notify(f"{seconds:g} s before, without {name}: {count} of {self.futures}")
 
@@ -584,7 +573,8 @@ class _Ensembles:
         names = [row.without for row in named if row.lead == named[0].lead][:2]
         if len(names) < 2:
             return []
-        first, second = (self.settings[lead, name] for name in names)
+        known = declared_interventions(self.bases[lead].scenario)
+        first, second = (known[name] for name in names)
         both, name = first | second, TOGETHER.join(names)
         if "faults" in first and "faults" in second:
             entries = named_fault_entries(self.bases[lead].scenario)
