@@ -366,10 +366,10 @@ def command_text(printed: PrintedPart) -> str:
         lines.append(f"  return {made};")
     else:  # the body takes another kind of command than the law gives
         places |= {"cx": "made.v0", "cy": "made.v1", "cz": "made.v2", "steer": "&steer"}
-        given = ", ".join(places.get(each, each) for each in steer.arguments)
+        handed = ", ".join(places.get(each, each) for each in steer.arguments)
         sets = (f"made.v{k} = taken.v{k};" for k in range(3))
         lines += [f"  const {name}_Steer steer = {name}_STEER;", "  (void)steer;", f"  {rule.returned} made = {made};",
-                  f"  const {steer.returned} taken = {steer.name}({given});", f"  {' '.join(sets)}",
+                  f"  const {steer.returned} taken = {steer.name}({handed});", f"  {' '.join(sets)}",
                   "  return made;"]  # fmt: skip
     text = "\n".join(lines)
     names = ("p", "index", "group", "heard", "neighbours", "surfaces", "walls_near", "percept", "period")
