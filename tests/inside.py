@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 MODULES = {
+    "c_printing": "c_printing",
     "course": "flight",
     "cpu": "cpu",
     "drivers": "drivers",

@@ -10,11 +10,14 @@ import pytest
 
 import airflock
 from airflock.core import HeardNeighbour, State, decide, number_names
-from airflock.engine import c_printing as print_module
-from airflock.engine.c_printing import CasePercept, print_law, printed_part
 from airflock.engine.text.c99 import REAL, WHOLE
 from airflock.parts import BODIES, FAULTS, LAWS, RADIOS, SENSORS
 from airflock.support import AirflockError, RuleError
+from inside import c_printing as print_module
+
+CasePercept, print_law, printed_part = (
+    getattr(print_module, name) for name in ("CasePercept", "print_law", "printed_part")
+)
 
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")

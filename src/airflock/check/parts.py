@@ -303,7 +303,7 @@ def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed
         kind, given = case
         made = call_rule(rules[kind], kind, {**given, "k": k}, part.name)
         if kind == "receive" and packet is not None:
-            made = (made[0], *made[1])
+            made = made[0]  # what it keeps has units of its own
         return np.atleast_1d(np.array(made, float))
 
     def scale(units: UnitScale, case: tuple[str, Mapping[str, Any]]) -> tuple[Any, Array]:

@@ -267,7 +267,9 @@ def sweep(o: SimpleNamespace, errors: ErrorCollector) -> None:
         axes = _axes(o.over or [], o.plot, errors)
         numbers = errors.read(options.seeds_from, o.first_seed, o.seeds)
         seeds = value_or_default(numbers, [0])  # the rest of the sweep is checked although they are wrong
-        made = errors.read(make_sweep, o.scenario, axes, seeds, fixed, o.law, o.precision, o.device, trust=o.trust)
+        # Where no axis could be read, that is said already; the rest is checked with a grid of one point.
+        grid = axes or ({"duration": [1.0]} if o.over else {})
+        made = errors.read(make_sweep, o.scenario, grid, seeds, fixed, o.law, o.precision, o.device, trust=o.trust)
     name = errors.read(lambda found: metric_to_show(o.show, found.scenarios), made) if o.scenario or o.resume else ""
     errors.read(options.check_flight_options, o.device, o.precision, o.scheduler)
     errors.raise_errors()

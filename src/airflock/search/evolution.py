@@ -15,6 +15,7 @@ from airflock.core import bound_values
 from airflock.engine import plan_of
 from airflock.recordings import load_recording, replay_recording
 from airflock.runs import (
+    REQUEST_FILE,
     RESULT_FILE,
     CandidateBatch,
     Executor,
@@ -201,7 +202,8 @@ def run_study(
     """
     if sensitivity:
         open_folder(folder, study, also={"sensitivity": sensitivity})
-    sensitivity = sensitivity or (read_request(folder, study.kind) or {}).get("also", {}).get("sensitivity", "")
+    elif (folder / REQUEST_FILE).is_file():  # a folder of one's own may hold flights alone
+        sensitivity = (read_request(folder, study.kind) or {}).get("also", {}).get("sensitivity", "")
     with open_run(folder, executor) as store:
         centres = run_search(study, store, executor, on_progress)
         result = conclude_study(study, store, executor, centres, folder, on_progress)

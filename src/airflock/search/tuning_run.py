@@ -11,7 +11,7 @@ import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from html import escape
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -228,6 +228,9 @@ def load_plan(folder: Path, start: Scenario, resume: bool | None) -> BudgetPlan 
 def read_plan(held: Mapping[str, Any], where: object) -> BudgetPlan:
     """Read the plan in the request of a tuning. Raises StudyError for a damaged one."""
     with as_error(f"{where}: is damaged", StudyError):
+        missing = [each.name for each in fields(BudgetPlan) if each.default is MISSING and each.name not in held]
+        if missing:
+            raise StudyError(f"{where}: is damaged: it lacks {', '.join(missing)}; give another --out")
         made = BudgetPlan(**{each.name: held[each.name] for each in fields(BudgetPlan) if each.name in held})
         numbers = made.seeds, made.seconds, made.rate, made.confidence
         sound = all(isinstance(value, int | float) for value in numbers) and isinstance(made.search, dict)
