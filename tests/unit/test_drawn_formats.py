@@ -553,7 +553,8 @@ def frames_without_a_rate(rng, tmp_path):
 @question
 def headings_in_the_place_of_heights(rng, tmp_path):
     truth = Truth(rng, rate=10.0)
-    turn = np.sign(np.cross(truth.velocity[0], truth.velocity[1]))
+    (x, y), (later_x, later_y) = truth.velocity[0].T[:2], truth.velocity[1].T[:2]
+    turn = np.sign(x * later_y - y * later_x)
     course = np.arctan2(truth.velocity[..., 1], truth.velocity[..., 0])
     course += rng.normal(0.0, rng.uniform(0.0, 0.2), course.shape)
     assert turn.any()
