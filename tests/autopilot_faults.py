@@ -101,7 +101,10 @@ def errors(made):
             begun = [text for kind, texts in CAUSES.items() if kind in own and own[kind].begin <= at for text in texts]
             peer = re.search(r"drone (\d+) is not heard", note)
             is_false = peer is not None and at < reboots.get(int(peer[1]), math.inf)
-            if at > BOOT_TIME and (is_false or not any(text in note for text in (*FREE, *begun))):
+            # One that rebooted in the air may have come down beside a drone that still stands.
+            fallen = re.search(r"drone (\d+) stands", note)
+            is_true = fallen is not None and at >= reboots.get(int(fallen[1]), math.inf)
+            if at > BOOT_TIME and not is_true and (is_false or not any(text in note for text in (*FREE, *begun))):
                 wrong.append(f"drone {who} at {at:.1f} s without a cause: {note}")
         # A message waits for a tick: of offsets next to the limit either side is right.
         off = abs(own["autopilot_clock"].amount) > made.card.safety.clock_error + made.card.safety.tick
