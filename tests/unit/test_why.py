@@ -146,7 +146,7 @@ def test_every_preset_can_fly_on_without_what_it_declares():
     for name in presets():
         scenario = airflock.load(name)
         for settings in causes.declared_interventions(scenario).values():
-            with_settings(scenario, settings)
+            assert with_settings(scenario, settings).agents == scenario.agents
 
 
 @pytest.mark.parametrize("name", ["vicsek_1995/ordered", "vasarhelyi_2018/4ms"])  # a periodic box, and one with walls

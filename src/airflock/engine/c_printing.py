@@ -148,9 +148,8 @@ def print_law(
 
 def _template(file: str, name: str, **parts: str) -> str:
     text = resources.files("airflock.engine.text").joinpath(f"templates/{file}").read_text(encoding="utf-8")
-    for place, part in {**parts, "LAW": name}.items():
-        text = text.replace(f"@{place}@", part)
-    return text
+    known = parts | {"LAW": name}
+    return re.sub(r"@([A-Z]+)@", lambda place: known[place[1]], text)  # an unknown place is a KeyError
 
 
 def printed_part(
@@ -162,6 +161,8 @@ def printed_part(
     if part == "law" and isinstance(text, str) and not settings and (text in MODELS or text.endswith(".py")):
         rules: Any = find_law(text, where="law", trust=True)
         numbers, steer, notes = rules.Parameters(), None, []
+    elif isinstance(text, str) and text in MODELS:
+        raise AirflockError(f"{text} is a law alone; other parts and settings are those of a preset or scenario file")
     else:
         scenario = scenario_variant(law, settings, trust=trust)
         faults = {entry.fault.name: entry for entry in scenario.faults}
@@ -272,7 +273,10 @@ def source_text(printed: PrintedPart) -> str:
 
 
 class _PairNames(ast.NodeTransformer):
-    """Writes the arguments of a pair as C has them: of the heard neighbour each field by itself."""
+    """Writes the arguments of a pair as C has them: of the heard neighbour each field by itself; free : other names."""
+
+    def __init__(self, free: Mapping[str, ast.expr]):
+        self.free = free
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         """Write heard.age as age, and so on."""
@@ -281,14 +285,14 @@ class _PairNames(ast.NodeTransformer):
         return node
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        """Write the guard of a square as its number."""
-        return ast.Constant(TINY) if node.id == "TINY" else node
+        """Write the guard of a square as its number, and a length by its function in C."""
+        return self.free.get(node.id, node)
 
 
 def _pair_function(printed: PrintedPart, wanted: Sequence[str]) -> None:
     """Print what a rule of neighbours asks for, from the text by which a pilot computes it on board."""
     printer, name = printed.printer, f"{printed.name}_pair"
-    printer.source.name(norm)
+    free = {"TINY": ast.Constant(TINY), "norm": ast.Name(printer.source.name(norm), ast.Load())}
     tree = tree_of(pair_arguments)
     last = tree.body[-1]
     assert isinstance(last, ast.Return) and isinstance(last.value, ast.Dict)
@@ -298,9 +302,9 @@ def _pair_function(printed: PrintedPart, wanted: Sequence[str]) -> None:
     names = ("own", "other", "age", "who", "heard_group", "index", "group")
     arguments = ast.arguments([], [ast.arg(each) for each in names], None, [], [], None, [])
     function = ast.FunctionDef(name, arguments, [*body, ast.Return(call)], [], lineno=1)
-    text = ast.unparse(ast.fix_missing_locations(_PairNames().visit(function)))
+    text = ast.unparse(ast.fix_missing_locations(_PairNames(free).visit(function)))
     printer.record(f"{printed.name}_Pair", wanted)
-    printer.source.blocks.append(text.replace("norm(", f"{printer.source.name(norm)}("))
+    printer.source.blocks.append(text)
     state = printer.record(f"{printed.name}_State", State._fields)
     printer.called(name, [state, state, REAL, WHOLE, REAL, WHOLE, REAL])
 

@@ -6,12 +6,12 @@ accelerates as the law asks for. A body that takes a heading flies along the wan
 acceleration gets what closes the gap in that time. Ours; an ideal body makes of it the law's own integration.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.core import Model, Parameters as Record, arc_cosine, norm, quantity, shorten, steered_law
+from airflock.core import Model, Parameters as Record, norm, quantity, shorten, steered_law
+from airflock.parts.bodies.turning import move as turned
 
 OURS = "our choice"
 NO_LIMIT = 1e6  # rad/s, in whatever units a flight counts
@@ -39,20 +39,7 @@ class Parameters(Record):
 
 def heading_to_velocity(cx, cy, cz, own, period, steer):
     """Velocity (m/s) along a heading to which the own one turns by at most the largest rate."""
-    along = own.hx * cx + own.hy * cy + own.hz * cz
-    sx = cx - along * own.hx
-    sy = cy - along * own.hy
-    sz = cz - along * own.hz
-    most = steer.turn * period
-    angle = min(arc_cosine(along), most)
-    free = most >= math.pi
-    k = math.sin(angle) / norm(sx, sy, sz)
-    c = math.cos(angle)
-    x = cx if free else c * own.hx + k * sx
-    y = cy if free else c * own.hy + k * sy
-    z = cz if free else c * own.hz + k * sz
-    s = steer.speed / norm(x, y, z)
-    return s * x, s * y, s * z
+    return turned(own.vx, own.vy, own.vz, cx, cy, cz, period, steer)  # as the body that flies headings turns
 
 
 def acceleration_to_velocity(cx, cy, cz, own, steer):
