@@ -292,6 +292,8 @@ def test_a_law_for_the_whole_flock_and_an_unknown_part_are_refused_in_one_line(t
     for part in ("bdy", "wind"):
         with pytest.raises(AirflockError, match="no such part; .*body"):
             print_law("vasarhelyi_2018/4ms", part=part, out=tmp_path)
+    with pytest.raises(AirflockError, match="couzin_2002 is a law alone"):
+        print_law("couzin_2002", part="body", out=tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(AirflockError, match="file: "):
         print_law("vasarhelyi_2018/4ms", out=tmp_path / "file")
