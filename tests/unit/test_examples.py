@@ -1,6 +1,8 @@
 """Examples and the start page's scenario file run as they stand; every publication named is in references.bib."""
 
+import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -24,6 +26,24 @@ def test_example_runs(path, tmp_path):
         pytest.importorskip(NEEDS[path.stem])
     done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, cwd=tmp_path, timeout=300)
     assert done.returncode == 0, done.stderr
+    assert "phi_vel" in done.stdout
+
+
+def test_plugin_is_built_installed_and_passes_its_own_tests_and_its_law_flies_by_name(tmp_path):
+    source, site = tmp_path / "plugin", tmp_path / "site"
+    shutil.copytree(ROOT / "examples" / "plugin", source)  # a build leaves files beside its source
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
+    path = os.pathsep.join([str(site), *sys.path])
+    env = {**os.environ, "PYTHONPATH": path, "COLUMNS": "120"}
+    fly = [sys.executable, "-m", "airflock", "run", "vasarhelyi_2018/4ms", "--law", "springs", "--device", "python"]
+    commands = (
+        [*pip, "--target", str(site), str(source)],
+        [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", str(source / "tests")],
+        [*fly, "--agents", "3", "--duration", "4", "--set", "model.rest=12"],
+    )
+    for command in commands:
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300, env=env)
+        assert done.returncode == 0, done.stdout + done.stderr
     assert "phi_vel" in done.stdout
 
 

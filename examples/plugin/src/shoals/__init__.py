@@ -1,0 +1,1 @@
+"""Parts of our own for Airflock, which finds them by the entry point `airflock.parts`."""
