@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import airflock
+from airflock.parts import METRICS, SETS, TOPOLOGIES
 from airflock.parts.metrics import metric_sets as registry
 from airflock.scenarios.named_code import MODELS
 
@@ -188,3 +190,20 @@ def test_a_notebook_shows_each_picture_in_the_cell_that_draws_it(folder):
             assert "matplotlib.figure" not in cell, f"{path.name}: Jupyter shows no bare Figure"
             if "= airflock.plot" in cell:
                 assert isinstance(last, ast.Expr) and isinstance(last.value, ast.Name), f"{path.name}: {cell[:60]}"
+
+
+def test_names_of_ours_beside_those_of_other_programs_exist():
+    reports = {name for one in METRICS.values() for name in one.reports} | {"fitness"}
+    partial = {name for one in SETS.values() for name in getattr(one, "reports", ())}
+    keys = airflock.keys()
+    words_of = {key.name for key in keys} | reports | partial | set(airflock.presets()) | set(TOPOLOGIES)
+    rows = re.findall(r"^\| .+ \| (.+) \|$", (DOCS / "coming_from.md").read_text(encoding="utf-8"), re.M)
+    named = [name for row in rows for name in re.findall(r"`([a-z_0-9]+(?:[./][a-z_0-9]+)*)`", row)]
+    ours = {name for name in named if not name.startswith("airflock.")}
+    assert len(ours) > 60
+    fields = {"periodic", "city", "position", "confidence", "seeds", "percept.ray"}
+    assert ours - words_of - fields == set()
+    assert all(hasattr(airflock, name.split(".")[1]) for name in named if name.startswith("airflock."))
+    text = (DOCS / "coming_from.md").read_text(encoding="utf-8")
+    for preset in re.findall(r"`airflock run (\S+)`", text):
+        assert preset in airflock.presets()
