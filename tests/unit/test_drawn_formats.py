@@ -981,10 +981,16 @@ AGREES = {
 } | {(name, "time_unit", "frames") for name in ("csv of frames", "array", "npy", "npz", "mat", "idtracker")}
 
 
+@pytest.fixture(scope="module")
+def plainly_read(tmp_path_factory):
+    """Each source with the options that it needs, and what is read of it without any other."""
+    known = sources(tmp_path_factory.mktemp("sources"))
+    return {name: (source, needs, airflock.load_tracks(source, **needs)) for name, (source, needs) in known.items()}
+
+
 @pytest.mark.parametrize("option", VALUES)
-def test_an_option_is_of_use_or_refused_whatever_the_source(tmp_path, option):
-    for name, (source, needs) in sources(tmp_path).items():
-        plain = airflock.load_tracks(source, **needs)
+def test_an_option_is_of_use_or_refused_whatever_the_source(plainly_read, option):
+    for name, (source, needs, plain) in plainly_read.items():
         for value in VALUES[option]:
             print(name, option, value)  # noqa: T201
             try:
