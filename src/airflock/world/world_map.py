@@ -4,6 +4,7 @@ Plain Python, as a drone carries it. A map is made from the record of an arena a
 stands in it, from rows of shapes behind their tree.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -187,6 +188,11 @@ BEYOND = {
 CLEAR = {"square": rays.to_box, "circle": rays.to_cylinder, "polygon": rays.to_polygon, "none": rays.to_nothing}
 
 
+def _walled(world: arena.Parameters) -> str:
+    """Return the shape of the walls of a world: none of a periodic one."""
+    return "none" if world.edges == "periodic" else world.arena
+
+
 @dataclass(frozen=True)
 class Shapes:
     """Shapes of a world: rows of `world.shapes` and the tree over them, as `world.bvh` reads it."""
@@ -212,8 +218,7 @@ class WorldMap:
         self._dims, self._look, self._casts = int(world.dimensions), look, casts
         self._walls, self._half, self._periodic = wall_functions(world), half_sizes(world), world.edges == "periodic"
         self._scene = found.shapes, found.nodes, found.links
-        kind = "none" if world.edges == "periodic" else world.arena
-        self._beyond, self._clear, self._flat = BEYOND[kind], CLEAR[kind], world.arena == "polygon"
+        self._beyond, self._clear, self._flat = BEYOND[_walled(world)], arena_ray(world), world.arena == "polygon"
         self._edges, self._corners, self._obstacles = edge_rows(world)
         self._obstacle, self._middle = obstacle_rule(world), middle_height(world) if is_off_centre(world) else 0.0
 
@@ -289,25 +294,22 @@ class WorldMap:
     def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float) -> float:
         """Free distance (m, at most length) of a thin ray along a unit vector."""
         free = min(length, self._clear(x, y, z - self._middle, ux, uy, uz, *self._half, self._edges, self._corners))
+        return self._free_of_solids(x, y, z, ux, uy, uz, free)
+
+    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
+        """Return True if an obstacle or the scene stands between two positions, m; walls of an arena do not hide."""
+        dx, dy, dz = to_x - x, to_y - y, to_z - z
+        length = norm(dx, dy, dz)
+        return self._free_of_solids(x, y, z, dx / length, dy / length, dz / length, length) < length
+
+    def _free_of_solids(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, free: float) -> float:
+        """Return how far a thin ray that is free so far (m) goes before it meets an obstacle or the scene, m."""
         for first, last in self._obstacles:
             if self._obstacle is polygon.prism:
                 free = min(free, polygon.ray_to_prism(x, y, z, ux, uy, uz, self._edges, first, last))
             else:
                 free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
         return float(bvh.cast(x, y, z, ux, uy, uz, free, 0.0, *self._scene))
-
-    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
-        """Return True if an obstacle or the scene stands between two positions, m; walls of an arena do not hide."""
-        dx, dy, dz = to_x - x, to_y - y, to_z - z
-        length = norm(dx, dy, dz)
-        ux, uy, uz = dx / length, dy / length, dz / length
-        free = float(bvh.cast(x, y, z, ux, uy, uz, length, 0.0, *self._scene))
-        for first, last in self._obstacles:
-            if self._obstacle is polygon.prism:
-                free = min(free, polygon.ray_to_prism(x, y, z, ux, uy, uz, self._edges, first, last))
-            else:
-                free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
-        return bool(free < length)
 
     def cast(
         self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float
@@ -322,48 +324,20 @@ class WorldMap:
         return float(bvh.cast(x, y, z, ux, uy, uz, free, radius, *self._scene)) if self._casts else float(free)
 
 
-RAYS = {"square": rays.to_box, "polygon": rays.to_polygon, "circle": rays.to_cylinder, "none": rays.to_nothing}
 EDGE_RULES = {"open": None, "bounce": edges.bounce, "periodic": edges.wrap}
 
 
 def arena_surfaces(world: arena.Parameters) -> tuple[tuple[Callable[..., Any], ...], Callable[..., float]]:
     """Families of surfaces of an arena, and its excursion function; a periodic one has no walls to feel or to leave."""
-    if world.edges == "periodic":
-        return (), excursion.beyond_nothing
-    three = world.dimensions == "3"
-    caps = (arena.plane,) if three else ()
-    ground = {"square": (arena.plane,), "polygon": caps, "circle": (arena.cylinder,), "none": ()}[world.arena]
-    if world.arena == "square" and world.walls == "nearest_per_axis":
-        return (arena.slab,), excursion.beyond_box
-    beyond = {
-        "square": excursion.beyond_box,
-        "polygon": excursion.beyond_polygon,
-        "circle": excursion.beyond_cylinder,
-        "none": excursion.beyond_nothing,
-    }[world.arena]
-    if three and world.arena == "circle":
-        return (arena.cylinder, arena.plane), beyond
-    return ground, beyond
+    return tuple(dict.fromkeys(function for function, _ in wall_functions(world))), BEYOND[_walled(world)]
 
 
 def arena_ray(world: arena.Parameters) -> Callable[..., float]:
     """Free distance along a direction to the arena's walls."""
-    return rays.to_nothing if world.edges == "periodic" else RAYS[world.arena]
+    return CLEAR[_walled(world)]
 
 
 def face_rows(world: arena.Parameters) -> tuple[list[list[float]], list[int]]:
     """Rows of the surface functions of `arena_surfaces`, and how many belong to each family."""
-    three = world.dimensions == "3"
-    h, z = 0.5 * world.side, 0.5 * world.height
-    low, high = arena.heights_of(world)
-    caps = [[0.0, 0.0, 1.0, -low], [0.0, 0.0, -1.0, high]] if three else []
-    if world.arena == "none" or world.edges == "periodic":
-        return [], []
-    if world.arena == "circle":
-        return [[0.0, 0.0, 0.0, world.radius], *caps], [1, len(caps)]
-    if world.arena == "square" and world.walls == "nearest_per_axis":
-        rows = [[1.0, 0.0, 0.0, h], [0.0, 1.0, 0.0, h]] + ([[0.0, 0.0, 1.0, z]] if three else [])
-        return rows, [len(rows)]
-    corners = ((-h, -h), (h, -h), (h, h), (-h, h)) if world.arena == "square" else ()  # a polygon's edges are no planes
-    rows = [list(inward_plane(a, b)) for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True)]
-    return rows + caps, [len(rows) + len(caps)]
+    walls = wall_functions(world)
+    return [list(row) for _, row in walls], list(Counter(function for function, _ in walls).values())
