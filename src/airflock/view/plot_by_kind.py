@@ -1,8 +1,10 @@
 """`airflock.plot`: draw a scenario or a recording, by the name of the kind of picture."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
+from inspect import signature
 from typing import Any
 
 import xarray as xr
@@ -21,7 +23,16 @@ from airflock.view.trajectory_plots import rays, through, trajectories
 KINDS = (
     "trajectories", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",
 )  # fmt: skip
-SCENARIO_KINDS = ("rules", "transfer")  # pictures that take no flight
+DRAWINGS: dict[str, Callable[..., Figure]] = {
+    "trajectories": trajectories,
+    "series": series,
+    "flocked": flocked,
+    "scene": through,
+    "space": partial(through, space=True),
+    "rays": rays,
+    "wash": wash,
+    "reception": received,
+}  # of a flight; the other two kinds are of a scenario
 PlotSource = Scenario | xr.Dataset | str | os.PathLike[str]
 
 
@@ -83,47 +94,34 @@ def plot(
     """
     if kind not in KINDS:
         raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{suggest(kind, KINDS, lead='; ')}")
-    if kind in SCENARIO_KINDS:
-        _refuse_tracks(source, kind)
-        scenario = _scenario(source, settings, law, trust)
+    if kind not in DRAWINGS:
+        opened = _opened(source)
+        if opened is not None and scenario_or_none(opened) is None:
+            raise RecordingError(
+                f"{_source_name(source)}: tracks were flown by no scenario, which the kind {kind} draws"
+            )
+        if opened is not None:
+            scenario = scenario_of_recording(opened, settings)
+        else:
+            scenario = scenario_variant(source, settings, law, trust=trust)  # type: ignore[arg-type]
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
     keep = ("heard",) if kind == "reception" else ()
     recording = recording_or_flight(source, seed, settings, law, trust=trust, keep=keep)
     with naming_file(source):
-        return _of_recording(recording, kind, start, stop, ax)
-
-
-def _refuse_tracks(source: PlotSource, kind: str) -> None:
-    """Raise RecordingError for tracks where a law or a fitness is drawn: they have none."""
-    recording = load_recording(source) if _is_recording_file(source) else source  # type: ignore[arg-type]
-    if isinstance(recording, xr.Dataset) and scenario_or_none(recording) is None:
-        raise RecordingError(f"{_source_name(source)}: tracks were flown by no scenario, which the kind {kind} draws")
-
-
-def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None, ax: Axes | None) -> Figure:
-    if kind in ("scene", "space"):
-        return through(recording, start=start, stop=stop, space=kind == "space", ax=ax)
-    if kind == "rays":
-        return rays(recording, start=start, ax=ax)
-    if kind == "wash":
-        return wash(recording, start=start, ax=ax)
-    if kind == "reception":
-        return received(recording, ax=ax)
-    if kind == "flocked":
-        return flocked(recording, start=start, stop=stop, ax=ax)
-    if kind == "series":
-        return series(recording, start=start, stop=stop, ax=ax)
-    return trajectories(recording, start=start, stop=stop, ax=ax)
+        draw, window = DRAWINGS[kind], {"start": start, "stop": stop}
+        taken = signature(draw).parameters
+        return draw(recording, ax=ax, **{name: moment for name, moment in window.items() if name in taken})
 
 
 def _is_recording_file(source: Any) -> bool:
     return isinstance(source, (str, os.PathLike)) and str(source).lower().endswith(".nc")
 
 
-def _scenario(source: PlotSource, settings: Mapping[str, Any] | None, law: Any, trust: bool) -> Scenario:
-    if isinstance(source, xr.Dataset) or _is_recording_file(source):
-        return scenario_of_recording(source if isinstance(source, xr.Dataset) else load_recording(source), settings)  # type: ignore[arg-type]
-    return scenario_variant(source, settings, law, trust=trust)
+def _opened(source: PlotSource) -> xr.Dataset | None:
+    """Return a recording, opened where its file is named; None of a scenario."""
+    if isinstance(source, xr.Dataset):
+        return source
+    return load_recording(source) if _is_recording_file(source) else None  # type: ignore[arg-type]
 
 
 def recording_or_flight(
@@ -131,13 +129,14 @@ def recording_or_flight(
     keep: Sequence[str] = (),
 ) -> xr.Dataset:  # fmt: skip
     """Return the recording, open the named recording, or fly the scenario."""
-    if isinstance(source, xr.Dataset) or _is_recording_file(source):
-        if settings or law is not None:
-            raise AirflockError(
-                f"{_source_name(source)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
-            )
-        return source if isinstance(source, xr.Dataset) else load_recording(source)  # type: ignore[arg-type]
-    return simulate(_scenario(source, settings, law, trust), seed, keep=keep)
+    if (settings or law is not None) and (isinstance(source, xr.Dataset) or _is_recording_file(source)):
+        raise AirflockError(
+            f"{_source_name(source)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
+        )
+    opened = _opened(source)
+    if opened is not None:
+        return opened
+    return simulate(scenario_variant(source, settings, law, trust=trust), seed, keep=keep)  # type: ignore[arg-type]
 
 
 @contextmanager

@@ -60,13 +60,7 @@ class SceneGeometry(NamedTuple):
 def scenario_geometry(scenario: Scenario, position: NDArray[Any]) -> SceneGeometry:
     """Return the scene of a scenario; position (agent, 3) in m places the view of an open world."""
     world, flat = scenario.world, scenario.dimensions == 2
-    bottom, top = heights_of(world)
-    solids, lines = [], []
-    plan = ground_plan(world)
-    if plan is not None:
-        floor, ceiling = (0.0, 0.0) if flat else (bottom, top)
-        lines.append(SceneLines("arena", prism_edges(np.array(plan.exterior.coords), floor, ceiling), ARENA_COLOUR))
-    shapes = _drawn_shapes(scenario)
+    plan, shapes = ground_plan(world), shapes_by_kind(scenario.stands().shapes)
     points = [np.array(plan.exterior.coords)] if plan is not None else []
     points += [rows[:, c : c + 2] for rows in shapes.values() for c in (0, 3) if len(rows)]
     points += [np.asarray(position)[:, :2]] if not points or world.arena != "square" else []
@@ -74,10 +68,7 @@ def scenario_geometry(scenario: Scenario, position: NDArray[Any]) -> SceneGeomet
     low, high = np.quantile(every, (0.0, 1.0), axis=0)
     span = max(0.55 * float(np.max(high - low)), 1e-3)
     tall = 0.12 * span
-    for number, outline in enumerate(world.obstacles):
-        ends = world.heights[number] if world.heights else (bottom, top)
-        flatly = (0.0, tall) if flat else (ends[0], ends[1])
-        solids.append(prism_solid(f"obstacle_{number}", np.array(outline)[:, :2], *flatly, OBSTACLE_COLOUR))
+    solids, lines = _arena_and_obstacles(world, tall)
     solids += scenery_solids(shapes, tall if flat else None)
     goals = scenario.waypoints()
     if len(goals):
@@ -85,14 +76,26 @@ def scenario_geometry(scenario: Scenario, position: NDArray[Any]) -> SceneGeomet
         cross = np.array([[[-1, 0, 0], [1, 0, 0]], [[0, -1, 0], [0, 1, 0]], [[0, 0, 0], [0, 0, 3]]], float) * size
         lines.append(SceneLines("goals", (goals[:, None, None] + cross).reshape(-1, 2, 3), GOAL_COLOUR))
     tops = [0.0, *(float(rows[:, 5].max()) for rows in shapes.values() if len(rows))]
-    span_z = (bottom, top) if plan is not None else (min(0.0, float(position[:, 2].min())), max(*tops, 1.0, 1.0))
+    span_z = heights_of(world) if plan is not None else (min(0.0, float(position[:, 2].min())), max(*tops, 1.0, 1.0))
     middle = np.array([*(0.5 * (low + high)), 0.0 if flat else 0.5 * (span_z[0] + span_z[1])])
     return SceneGeometry(solids, lines, span, middle, (0.0, 0.0) if flat else span_z)
 
 
-def _drawn_shapes(scenario: Scenario) -> dict[float, NDArray[Any]]:
-    """Return the rows of the drawn shapes of a scene by their kind."""
-    return shapes_by_kind(scenario.stands().shapes)
+def _arena_and_obstacles(
+    world: arena.Parameters, tall: float, lift: float = 0.0
+) -> tuple[list[SceneSolid], list[SceneLines]]:
+    """Return the obstacles, and the lines of the arena, `lift` m higher; in a plane obstacles stand `tall` m high."""
+    flat, lines, solids = world.dimensions == "2", [], []
+    whole = (0.0, 0.0) if flat else heights_of(world)
+    plan = ground_plan(world)
+    if plan is not None:
+        corners = np.array(plan.exterior.coords)
+        lines.append(SceneLines("arena", prism_edges(corners, lift + whole[0], lift + whole[1]), ARENA_COLOUR))
+    for number, outline in enumerate(world.obstacles):
+        low, high = world.heights[number] if world.heights else whole
+        ends = (0.0, tall) if flat else (lift + low, lift + high)
+        solids.append(prism_solid(f"obstacle_{number}", np.array(outline)[:, :2], *ends, OBSTACLE_COLOUR))
+    return solids, lines
 
 
 def shapes_by_kind(rows: NDArray[Any]) -> dict[float, NDArray[Any]]:
@@ -180,19 +183,10 @@ def card_scene(card: FlightCard) -> SceneGeometry:
     world = arena.Parameters(**to_tuples(card.document["world"]))
     rows = np.array(card.document["shapes"].get("shapes", []), float).reshape(-1, 18)
     lift = 0.0 if len(rows) else card.height
-    bottom, top = (0.0, 0.0) if card.flat else arena.heights_of(world)
     fence = np.array(card.document["fence"]["corners"], float)[:, :2]
-    lines = [SceneLines("fence", prism_edges(np.vstack([fence, fence[:1]]), card.low, card.high), FENCE_COLOUR)]
-    plan = ground_plan(world)
-    if plan is not None:
-        lines.append(
-            SceneLines("arena", prism_edges(np.array(plan.exterior.coords), lift + bottom, lift + top), ARENA_COLOUR)
-        )
-    solids = []
-    for number, outline in enumerate(world.obstacles):
-        low, high = world.heights[number] if world.heights else (bottom, top)
-        foot, roof = (0.0, card.high) if card.flat else (lift + low, lift + high)
-        solids.append(prism_solid(f"obstacle_{number}", np.array(outline)[:, :2], foot, roof, OBSTACLE_COLOUR))
+    solids, lines = _arena_and_obstacles(world, card.high, lift)
+    edges = prism_edges(np.vstack([fence, fence[:1]]), card.low, card.high)
+    lines = [SceneLines("fence", edges, FENCE_COLOUR), *lines]
     solids += scenery_solids(shapes_by_kind(rows), None)
     ends = np.array([fence.min(axis=0), fence.max(axis=0)])
     middle = np.array([*ends.mean(axis=0), 0.5 * card.height])

@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection, PatchCollection, PolyCollecti
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from airflock.core import HeardNeighbour, State
@@ -76,11 +77,18 @@ def through(
     goals = scenario.waypoints()
     goals = goals[((goals[:, :2] >= low) & (goals[:, :2] <= high)).all(axis=1)]
     if space:
-        draw_in_space(axes, scenario, shown, scale, goals)
+        view, rows = projection(3, elevation_deg=VIEW_ELEVATION_DEG), shapes_near_paths(scenario, shown)
+        box = picture_extent(shown, scenario.world, view, margin=0.02, around=outlines_in_space(rows))
+        draw_walls(axes, scenario.world, 0.8, view)
+        draw_outlines(axes, rows, view)
+        _draw_paths(axes, shown, scenario.world, scale, view)
+        _draw_goals(axes, np.stack(view(goals), axis=-1))
+        _triad(axes, view, box)
+        axes.set(xlim=box[:2], ylim=box[2:], aspect="equal")
+        axes.set_axis_off()
     else:
-        rows = shapes_near_paths(scenario, shown)
-        heights = draw_ground_plans(axes, rows)
-        _paths(axes, shown, scale)
+        heights = draw_ground_plans(axes, shapes_near_paths(scenario, shown))
+        _draw_paths(axes, shown, scenario.world, scale, projection(2))
         _draw_goals(axes, goals[:, :2])
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         style.style_axes(axes, "east (m)", "north (m)", grid=False)
@@ -91,30 +99,6 @@ def through(
     style.add_legend(axes, above=True)
     style.set_title(axes, short_name(recording), title_details(recording, shown))
     return figure
-
-
-def draw_in_space(axes: Any, scenario: Scenario, paths: FlightPaths, scale: Normalize, goals: NDArray[Any]) -> None:
-    """Draw outlines of the scene, paths, goals and a scale of three axes, obliquely from above."""
-    view, rows = projection(3, elevation_deg=VIEW_ELEVATION_DEG), shapes_near_paths(scenario, paths)
-    box = picture_extent(paths, scenario.world, view, margin=0.02, around=outlines_in_space(rows))
-    for wall in wall_lines(scenario.world):
-        axes.plot(*view(wall.corners), color=style.RED if wall.obstacle else style.BLUE, linewidth=0.8, zorder=1)
-    draw_outlines(axes, rows, view)
-    stride = max(1, len(paths.times) * paths.agents // 60_000)
-    where, speed = paths.position[::stride], paths.speed[::stride]
-    pieces = np.stack([where[:-1], where[1:]], axis=1).transpose(0, 3, 1, 2).reshape(-1, 2, 3)
-    pace = (0.5 * (speed[:-1] + speed[1:])).ravel()
-    kept = np.isfinite(pieces).all(axis=(1, 2)) & ~crosses_periodic_face(pieces, scenario.world)
-    flat = np.stack(view(pieces[kept], axis=2), axis=-1)
-    lines = LineCollection(list(flat), norm=scale, cmap=style.SPEED_COLOURS, linewidths=0.9, zorder=3)
-    lines.set_array(pace[kept])
-    axes.add_collection(lines)
-    ends = np.stack(view(paths.position[-1].T), axis=-1)
-    axes.scatter(*ends.T, s=14.0, color=style.INK, edgecolors="white", linewidths=0.4, zorder=5, label="at the end")
-    _draw_goals(axes, np.stack(view(goals), axis=-1))
-    _triad(axes, view, box)
-    axes.set(xlim=box[:2], ylim=box[2:], aspect="equal")
-    axes.set_axis_off()
 
 
 def _draw_goals(axes: Any, points: NDArray[Any]) -> None:
@@ -206,17 +190,15 @@ def scenery_lines(recording: xr.Dataset, paths: FlightPaths) -> list[NDArray[np.
     return outlines_in_space(rows) if paths.position.shape[1] == 3 else [SHAPES[r[6]].plan(r) for r in rows]
 
 
-def _paths(axes: Any, paths: FlightPaths, scale: Normalize) -> None:
-    stride = max(1, len(paths.times) * paths.agents // 60_000)
-    where, speed = paths.position[::stride, :2], paths.speed[::stride]
-    for agent in range(paths.agents):
-        line = where[:, :, agent]
-        segments = np.stack([line[:-1], line[1:]], axis=1)
-        pieces = LineCollection(list(segments), norm=scale, cmap=style.SPEED_COLOURS, linewidths=0.9, zorder=3)
-        pieces.set_array(speed[:-1, agent])
-        axes.add_collection(pieces)
+def _draw_paths(axes: Any, paths: FlightPaths, world: arena.Parameters, scale: Normalize, view: Projection) -> None:
+    """Draw all paths, coloured by speed, and where they end."""
+    segments, speed = map(np.concatenate, zip(*_agent_segments(paths, world, paths.speed, 0.5), strict=True))
+    flat = np.stack(view(segments, axis=2), axis=-1)
+    lines = LineCollection(list(flat), norm=scale, cmap=style.SPEED_COLOURS, linewidths=0.9, zorder=3)
+    lines.set_array(speed)
+    axes.add_collection(lines)
     look: dict[str, Any] = {"s": 14.0, "color": style.INK, "edgecolors": "white", "linewidths": 0.4}
-    axes.scatter(*paths.position[-1, :2], zorder=5, label="at the end", **look)
+    axes.scatter(*view(paths.position[-1], axis=0), zorder=5, label="at the end", **look)
 
 
 MAX_SECONDS = 60.0  # s; longer paths cover each other
@@ -287,7 +269,7 @@ def trajectories(
     size = 14.0 if shown.agents <= 150 else 5.0
     dots: dict[str, Any] = {"depthshade": False} if space else {}
     axes.scatter(*ends, s=size, color=style.INK, linewidths=0.4, edgecolors="white", zorder=5, label="end", **dots)
-    _draw_world(axes, world)
+    draw_walls(axes, world, 0.8 if space else 1.2)
     labels = axis_names(recording)
     if space:
         _in_space(axes, shown, world, labels)
@@ -405,13 +387,14 @@ def _draw(
     axes.add_collection(lines)
 
 
-def _draw_world(axes: Any, world: arena.Parameters) -> None:
+def draw_walls(axes: Any, world: arena.Parameters, width: float, view: Projection | None = None) -> None:
+    """Draw the lines of arena and obstacles, `width` points wide; in the plane obstacles are filled."""
     for corners, obstacle in wall_lines(world):
-        color = style.RED if obstacle else style.BLUE
+        color, points = style.RED if obstacle else style.BLUE, corners.T if view is None else view(corners)
         if corners.shape[1] == 2 and obstacle:
-            axes.fill(*corners.T, facecolor=color, alpha=0.25, edgecolor=color, linewidth=1.0, zorder=1)
+            axes.fill(*points, facecolor=color, alpha=0.25, edgecolor=color, linewidth=width - 0.2, zorder=1)
         else:
-            axes.plot(*corners.T, color=color, linewidth=1.2 if corners.shape[1] == 2 else 0.8, zorder=1)
+            axes.plot(*points, color=color, linewidth=width, zorder=1)
 
 
 def _agent_label(recording: xr.Dataset, agent: int) -> str:
@@ -442,14 +425,8 @@ def _in_space(axes: Any, paths: FlightPaths, world: arena.Parameters, labels: tu
         axis.pane.set_visible(False)
         axis.set_tick_params(labelsize=style.SMALL_SIZE)
         axis._axinfo["grid"].update(color=style.PALE_GREY, linewidth=0.4)
-    axes.zaxis.set_major_locator(_sparse_locator())
+    axes.zaxis.set_major_locator(MaxNLocator(4))
     axes.view_init(elev=25.0, azim=-60.0)
-
-
-def _sparse_locator() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4)
 
 
 def rays_at_frame(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[CastRay], tuple[float, float, float]]:

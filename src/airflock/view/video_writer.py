@@ -33,11 +33,11 @@ from airflock.view.flight_paths import (  # fmt: skip
     title_details,
     world_or_open,
 )
-from airflock.view.scene import wall_lines
 from airflock.view.style import PictureError, atomic_picture, check_positive
 from airflock.view.trajectory_plots import (
     VIEW_ELEVATION_DEG,
     draw_outlines,
+    draw_walls,
     outlines_in_space,
     scenery_lines,
     shapes_near_paths,
@@ -87,7 +87,7 @@ class VideoFrame:
         self.axes = axes = self.canvas.figure.add_axes((0.0, 0.0, share, 1.0))
         axes.set(xlim=(left, right), ylim=(bottom, top + head), aspect="equal")
         axes.set_axis_off()
-        self._stand(axes)
+        draw_walls(axes, world, 1.4, self.view)
         if rows is not None:
             draw_outlines(axes, rows, self.view)
         else:
@@ -124,26 +124,11 @@ class VideoFrame:
             self.chart_cursor.axes.draw_artist(self.chart_cursor)
         return np.asarray(self.canvas.buffer_rgba())
 
-    def _stand(self, axes: Any) -> None:
-        """Draw walls and obstacles."""
-        for corners, obstacle in wall_lines(self.world):
-            x, y = self.view(corners)
-            color = style.RED if obstacle else style.BLUE
-            if obstacle and self.flat:
-                axes.fill(x, y, facecolor=color, alpha=0.25, edgecolor=color, linewidth=1.2)
-            else:
-                axes.plot(x, y, color=color, linewidth=1.4)
-
     def _positions(self, instant: float) -> Array:
-        """Return positions of all agents (axis, agent), m."""
-        return _interpolated(self.paths.times, self.paths.position, instant, self._periodic_halves)
-
-    @property
-    def _periodic_halves(self) -> Array | None:
-        """Return half the periods of the world along each axis, m: longer steps lead through a periodic face."""
-        if self.world.edges != "periodic":
-            return None
-        return np.array(half_sizes(self.world)[: self.paths.position.shape[1]])
+        """Return positions of all agents (axis, agent), m; a step of more than half a period leads through a face."""
+        axes = self.paths.position.shape[1]
+        halves = np.array(half_sizes(self.world)[:axes]) if self.world.edges == "periodic" else None
+        return _interpolated(self.paths.times, self.paths.position, instant, halves)
 
     def _velocities(self, instant: float) -> tuple[Array, Array, Array]:
         """Return velocities of all agents along the picture, and their speeds, m/s."""
