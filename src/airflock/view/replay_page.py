@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -292,6 +293,7 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
     first = float(recording["time"].values[0])
     name = attributes.recording_name(recording)
     speed = np.sqrt((frames[::stride, axes:] ** 2).sum(1))
+    mean = np.ma.masked_invalid(speed).mean(axis=1).filled(np.nan)
     nearest, collisions = _nearest_and_collisions(frames[:, :axes], present, period, scenario)
     about = {
         "name": name, "seed": int(recording.attrs["airflock_seed"]) if "airflock_seed" in recording.attrs else None,
@@ -302,7 +304,7 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
         "height": [float(np.nanmin(frames[:, axes - 1])), float(np.nanmax(frames[:, axes - 1]))],
         "leap": _longest_step(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
         "events": _event_rows(recording, scenario), "stage": stage,
-        "charts": _charts({"mean speed (m/s)": _mean_over_present(speed), "nearest pair (m)": nearest[::stride]}),
+        "charts": _charts({"mean speed (m/s)": mean, "nearest pair (m)": nearest[::stride]}),
     }  # fmt: skip
     return Replay(_page_html(name, about, packed.data), name)
 
@@ -340,13 +342,8 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
     """Keep an absent agent at its last position, or at its first one before it appears."""
     if present.all():
         return frames
-    times = np.arange(len(frames))[:, None]
-    last = np.maximum.accumulate(np.where(present, times, -1), axis=0)
-    # Index of the last frame with the agent, found by a running maximum instead of a loop over
-    # agents.
-    source = np.where(last >= 0, last, present.argmax(axis=0))
-    kept = np.take_along_axis(frames, source[:, None, :], axis=0)
-    ever = present.any(axis=0)
+    known = pd.DataFrame(np.where(present[:, None], frames, np.nan).reshape(len(frames), -1)).ffill().bfill()
+    kept, ever = known.to_numpy().reshape(frames.shape).copy(), present.any(axis=0)
     kept[:, :, ~ever] = kept[:, :, [int(ever.argmax())]]
     return kept
 
@@ -354,13 +351,6 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
 def _charts(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
     """Return charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
     return [[title, _rounded(values)] for title, values in courses.items() if np.isfinite(values).any()]
-
-
-def _mean_over_present(speed: NDArray[Any]) -> NDArray[Any]:
-    """Return the mean (time,) over present agents; nan where there is none."""
-    known = np.isfinite(speed)
-    total = np.where(known, speed, 0.0).sum(axis=1)
-    return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
 
 
 def _layer_json(shade: AgentColours) -> dict[str, Any]:

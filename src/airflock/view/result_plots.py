@@ -220,14 +220,13 @@ def _draw_step_response(panel: Axes, logs: FlightLogs, result: IdentifyResult) -
     value, time = result.body.value, logs.time[rows]
     rate = held.decay_rate(value["tau"], result.like.flight.dt)
     state, computed = logs.velocity[rows[0]].copy(), []
-    for k, row in enumerate(rows):
+    for k in range(len(rows)):
         if k:
             wish = logs.command[rows[k - 1]]
             size = max(float(np.linalg.norm(wish - state)), 1e-12)
             left, _ = held.gap_left(size, float(time[k] - time[k - 1]), value["tau"], rate, value["a_max"])
             state = wish - (wish - state) * (left / size)
         computed.append(state[0])
-        del row
     time = time - time[0]
     panel.step(time, logs.command[rows, 0], where="post", color=style.GREY, linewidth=0.8, label="commanded")
     panel.plot(time, logs.velocity[rows, 0], color=style.BLUE, linewidth=0.9, label="logged")
@@ -400,9 +399,7 @@ def plot_inferred(result: InferResult, *, ax: Axes | None = None) -> Figure:
             else:
                 panel.set_xlabel("left – right (m)", fontsize=style.SMALL_SIZE)
         panels[part][0].set_ylabel("back – front (m)", fontsize=style.SMALL_SIZE)
-        bar = figure.colorbar(drawn, ax=list(panels[part]), shrink=0.85)
-        bar.set_label(f"acceleration {what} (m/s²)", fontsize=style.SMALL_SIZE)
-        bar.ax.tick_params(labelsize=style.SMALL_SIZE)
+        style.add_colour_bar(figure, drawn, list(panels[part]), f"acceleration {what} (m/s²)", shrink=0.85)
     style.set_figure_title(figure, "inferred", result.verdict)
     return style.root_figure(figure)
 

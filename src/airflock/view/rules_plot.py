@@ -6,7 +6,7 @@ panel for each.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import FunctionType, SimpleNamespace
 from typing import Any, NamedTuple
@@ -66,29 +66,29 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
     return model.neighbour(*(arguments[name] for name in names))
 
 
+def _responses(sums: Any, axis: int, answers: Sequence[Any], sign: float = 1.0) -> list[RuleResponse]:
+    """Return component `axis` of each vector among the fields of a record, of all answers, times a sign."""
+    return [
+        RuleResponse(name, sign * np.array([getattr(answer, fields[axis]) for answer in answers], float))
+        for name, fields in vector_fields(sums).items()
+    ]
+
+
 def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
     """Return the push away from a resting neighbour at distances r (m), positive outwards; one response per
     vector.
     """
-    sums = [pair_sums(model, p, float(d)) for d in r]
-    return [
-        RuleResponse(name, np.array([-getattr(s, x) for s in sums], dtype=float))
-        for name, (x, _) in vector_fields(model.Sums).items()
-    ]
+    return _responses(model.Sums, 0, [pair_sums(model, p, float(d)) for d in r], -1.0)
 
 
 def alignment_curve(model: Model, p: Any, r: Array, dv: float) -> list[RuleResponse]:
     """Return the response to a velocity difference dv (m/s) at distances r (m), beyond that to a resting
     neighbour.
     """
-    rest = [pair_sums(model, p, float(d)) for d in r]
-    moved = [pair_sums(model, p, float(d), dv) for d in r]
-    return [
-        RuleResponse(
-            name, np.array([getattr(b, y) - getattr(a, y) for a, b in zip(rest, moved, strict=True)], dtype=float)
-        )
-        for name, (_, y) in vector_fields(model.Sums).items()
-    ]
+    moved, rest = (
+        _responses(model.Sums, 1, [pair_sums(model, p, float(d), difference) for d in r]) for difference in (dv, 0.0)
+    )
+    return [one._replace(values=one.values - other.values) for one, other in zip(moved, rest, strict=True)]
 
 
 def allowed_difference_curve(model: Model, p: Any, r: Array) -> Array:
@@ -127,10 +127,7 @@ def wall_curve(model: Model, p: Any, distance: Array, v: float) -> list[RuleResp
     names = argument_names(model.boundary, "boundary", model.name)
     arguments = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
     answers = [model.boundary(*({**arguments, "distance": float(d)}[name] for name in names)) for d in distance]
-    return [
-        RuleResponse(name, np.array([getattr(a, x) for a in answers], dtype=float))
-        for name, (x, _) in vector_fields(model.Walls).items()
-    ]
+    return _responses(model.Walls, 0, answers)
 
 
 CURVE_POINTS = 400
@@ -241,13 +238,8 @@ def _pair_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: 
 
 
 def _alignment_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
-    for share, color in zip(DIFFERENCE_SHARES, (style.ORANGE, style.RED, style.PURPLE), strict=True):
-        for number, term in enumerate(alignment_curve(model, p, r, share * dv)):
-            dashes = ("-", "--", ":")[number % 3]
-            label = _curve_label(f"$\\Delta v$ = {share * dv:.3g} m/s", term.name)
-            axes.plot(r, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
+    _draw_shares(axes, r, dv, partial(alignment_curve, model, p, r), "$\\Delta v$ = {:.3g} m/s")
     style.style_axes(axes, "distance (m)", f"alignment term ({unit})")
-    axes.set_xlim(0.0, float(r[-1]))
     low, high = axes.get_ylim()
     axes.set_ylim(min(0.0, low), 1.4 * high)  # room for the legend
     style.add_legend(axes)
@@ -256,16 +248,20 @@ def _alignment_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, u
 def _wall_panel(axes: Axes, *, model: Model, p: Any, r: Array, v: float, unit: str) -> None:
     reach = float(r[-1])
     distance = np.linspace(-0.1 * reach, reach, CURVE_POINTS)
-    colors = (style.ORANGE, style.RED, style.PURPLE)
-    for share, color in zip(DIFFERENCE_SHARES, colors, strict=True):
-        for number, term in enumerate(wall_curve(model, p, distance, share * v)):
-            dashes = ("-", "--", ":")[number % 3]
-            label = _curve_label(f"{share * v:.3g} m/s towards it", term.name)
-            axes.plot(distance, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
+    _draw_shares(axes, distance, v, partial(wall_curve, model, p, distance), "{:.3g} m/s towards it")
     axes.axvspan(float(distance[0]), 0.0, color=style.PALE_GREY, alpha=0.6, linewidth=0.0)
     style.style_axes(axes, "distance to the wall (m)", f"wall term ({unit})")
-    axes.set_xlim(float(distance[0]), reach)
     style.add_legend(axes)
+
+
+def _draw_shares(axes: Axes, at: Array, v: float, curve: Callable[[float], list[RuleResponse]], label: str) -> None:
+    """Draw what a rule answers at distances (m) to shares of a velocity v, m/s, each vector with dashes of its own."""
+    for share, color in zip(DIFFERENCE_SHARES, (style.ORANGE, style.RED, style.PURPLE), strict=True):
+        for number, term in enumerate(curve(share * v)):
+            dashes = ("-", "--", ":")[number % 3]
+            text = _curve_label(label.format(share * v), term.name)
+            axes.plot(at, term.values, color=color, linewidth=1.8, linestyle=dashes, label=text)
+    axes.set_xlim(float(at[0]) if at[0] < 0.0 else 0.0, float(at[-1]))
 
 
 def _curve_label(label: str, name: str) -> str:
