@@ -11,8 +11,8 @@ from .attributes import (
 from .dataset import (
     DIMENSIONS as DIMENSIONS,
     check_recording as check_recording,
-    differentiated_velocity as differentiated_velocity,
     make_dataset as make_dataset,
+    motion_arrays as motion_arrays,
     recording_frames as recording_frames,
 )
 from .exports import (

@@ -119,9 +119,7 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
     is not recorded.
     """
     check_recording(recording, where)
-    order = ("time", "space", "keypoint", "individual")
-    position = recording["position"].transpose(*order).isel(keypoint=0).values
-    times = recording["time"].values.astype(float)
+    times, position, velocity = motion_arrays(recording)
     steps = np.diff(times)
     period = float(np.median(steps)) if steps.size else 1.0
     if not SHORTEST <= period < np.inf:
@@ -132,11 +130,7 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
         raise RecordingError(
             f"{where}: frames are {steps.min():g} to {steps.max():g} s apart; resample to a constant rate"
         )
-    if "velocity" in recording:
-        velocity = recording["velocity"].transpose(*order).isel(keypoint=0).values
-    elif len(times) > 1:
-        velocity = differentiated_velocity(position, times)
-    else:
+    if velocity is None:
         raise RecordingError(f"{where}: one frame without velocity has no speed to score")
     frames = np.concatenate([position, velocity], axis=1)
     # nan means absent, infinity is an error: it would turn every mean into infinity.
@@ -154,6 +148,24 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
 
 
 Array = NDArray[Any]
+
+
+def motion_arrays(recording: xr.Dataset, keypoint: int = 0, kind: Any = None) -> tuple[Array, Array, Array | None]:
+    """Return times (frame,), s, and position and velocity (frame, axis, individual), m and m/s, of a keypoint.
+
+    Velocity is differentiated from position where it is not recorded; None of a single frame.
+    kind : type of the numbers; by default that of the recording
+    """
+    own = recording.isel(keypoint=keypoint)
+    times = own["time"].values.astype(float)
+    position, *recorded = (
+        np.asarray(own[name].transpose("time", "space", "individual").values, kind)
+        for name in ("position", "velocity")
+        if name in own
+    )
+    if recorded:
+        return times, position, recorded[0]
+    return times, position, differentiated_velocity(position, times) if len(times) > 1 else None
 
 
 # numpy.gradient weighs three equal positions with weights that do not cancel: a group at rest then

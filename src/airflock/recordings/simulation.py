@@ -16,10 +16,11 @@ from airflock import __version__
 from airflock.core import radio, random
 from airflock.engine import Flight, driver_text, fly_world, pick_device
 from airflock.recordings.attributes import FAULTS_ATTRIBUTE
-from airflock.recordings.dataset import DIMENSIONS, VARIABLE_UNITS, make_dataset
+from airflock.recordings.dataset import DIMENSIONS, VARIABLE_UNITS, box_sides, make_dataset, nearest_image
 from airflock.scenarios import MODELS, Event, Scenario, check_seed, group_names, law_hash, load_if_named, step_counts
 from airflock.support import FlightError, processor_name, toolchain_versions
-from airflock.world import half_sizes
+
+Array = NDArray[Any]
 
 
 def simulate(
@@ -97,14 +98,12 @@ def simulate(
     assert flown.frames is not None
     times = np.arange(len(flown.frames)) * step_counts(scenario)["sample_every"] * scenario.flight.dt
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None), "airflock_device": device}
-    return make_dataset(
-        flown.frames,
-        scenario.dimensions,
-        times,
-        attributes,
-        scenario.model.command,
-        group_names(scenario.groups, scenario.agents),
-    )
+    return _recording(scenario, flown.frames, times, attributes)
+
+
+def _recording(scenario: Scenario, frames: Array, times: Array, attributes: dict[str, Any]) -> xr.Dataset:
+    groups = group_names(scenario.groups, scenario.agents)
+    return make_dataset(frames, scenario.dimensions, times, attributes, scenario.model.command, groups)
 
 
 def recording_of(flight: Flight) -> xr.Dataset:
@@ -145,10 +144,7 @@ def recording_of(flight: Flight) -> xr.Dataset:
         )
     if flight.faults:
         attributes[FAULTS_ATTRIBUTE] = json.dumps({"faults": to_plain_values(flight.faults)})
-    return make_dataset(
-        flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command,
-        group_names(scenario.groups, scenario.agents),
-    )  # fmt: skip
+    return _recording(scenario, flight.frames, flight.frame_times, attributes)
 
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
@@ -196,7 +192,6 @@ def to_plain_values(value: Any) -> Any:
 # What agents measured and received, beside a recording. The flight is the closed one, bit for bit:
 # it is cut at its decisions, where an open flight may be cut. Measured states are read from it;
 # packets of a plain radio are drawn again from the same counters as in the driver.
-Array = NDArray[Any]
 KINDS = ("measured", "heard")
 FARTHEST = 1e8  # m; the limit of any range in a driver
 
@@ -225,45 +220,34 @@ def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable
     every, sample = times["decide_every"], times["sample_every"]
     late = times["delay"] * dt
     stamps = np.full((n, n), np.nan)
-    measured: list[Array] = []
-    ages: list[Array] = []
-    following = 0  # frame
+    known: list[tuple[Array | None, Array | None]] = []  # of each frame: own states as measured, and ages (s) of the others'
+
+    def note(end: int) -> None:
+        """Note what agents know at all frames before a step."""
+        for frame in range(len(known), -(-end // sample)):
+            ages = frame * sample * dt - stamps if "heard" in keep else None
+            known.append((flight.measured if "measured" in keep else None, ages))
+
     # One turn per decision: sense, note what the frames until the next decision see, then fly on.
     while not flight.over:
         flight.sense()
-        now = flight.step * dt
         last = min(flight.step + every, times["steps"])
         if "heard" in keep:
-            stamps = _stamps(flight, stamps, flight.step // every, now, late)
-        own = flight.measured if "measured" in keep else None
-        while following * sample < last:
-            _note(measured, ages, own, stamps if "heard" in keep else None, following * sample * dt)
-            following += 1
+            stamps = _stamps(flight, stamps, flight.step // every, flight.step * dt, late)
+        note(last)
         flight.advance(steps=last - flight.step)
-    if following * sample <= times["steps"]:
-        own = flight.measured if "measured" in keep else None
-        _note(measured, ages, own, stamps if "heard" in keep else None, following * sample * dt)
+    note(times["steps"] + 1)
     flight.finish()
-    count = len(flight.frame_times)
-    return _variables(measured[:count], ages[:count], scenario.dimensions)
-
-
-def _note(measured: list[Array], ages: list[Array], own: Array | None, stamps: Array | None, time: float) -> None:
-    if own is not None:
-        measured.append(own)
-    if stamps is not None:
-        ages.append(time - stamps)
-
-
-def _variables(measured: list[Array], ages: list[Array], dimensions: int) -> dict[str, xr.Variable]:
     found: dict[str, xr.Variable] = {}
-    if measured:
-        table = np.array(measured)[:, :, None, :]
+    del known[len(flight.frame_times) :]
+    if "measured" in keep:
+        table = np.array([own for own, _ in known])[:, :, None, :]
         for c, name in enumerate(("position", "velocity")):
-            part = table[:, c * dimensions : (c + 1) * dimensions]
+            part = table[:, c * scenario.dimensions : (c + 1) * scenario.dimensions]
             found[f"measured_{name}"] = xr.Variable(DIMENSIONS, part, {"units": VARIABLE_UNITS[name]})
-    if ages:
-        found["age"] = xr.Variable(("time", "receiver", "sender"), np.array(ages, np.float32), {"units": "s"})
+    if "heard" in keep:
+        every_age = np.array([ages for _, ages in known], np.float32)
+        found["age"] = xr.Variable(("time", "receiver", "sender"), every_age, {"units": "s"})
     return found
 
 
@@ -292,10 +276,7 @@ def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float)
         return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)
     place = flight.state[: flight.scenario.dimensions].astype(float)
     offset = place[:, None, :] - place[:, :, None]  # from receiver (first) to sender
-    if flight.scenario.world.edges == "periodic":
-        halves = half_sizes(flight.scenario.world)
-        for d, half in zip(offset, halves, strict=False):
-            d -= 2.0 * half * np.round(d / (2.0 * half))
+    offset = nearest_image(offset, box_sides(flight.scenario.world, len(place)))
     apart = np.sqrt((offset**2).sum(axis=0))
     heard = (apart <= min(k.range, FARTHEST)) & ~np.eye(n, dtype=bool)
     # Probabilities only for pairs in range: the rule is a Python call for each pair.

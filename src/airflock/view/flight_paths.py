@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.recordings import DIMENSIONS, attributes, check_recording, differentiated_velocity, scenario_of_recording
+from airflock.recordings import attributes, check_recording, motion_arrays, scenario_of_recording
 from airflock.scenarios import Scenario
 from airflock.support import RecordingError
 from airflock.view.scene import wall_lines
@@ -56,16 +56,8 @@ def paths_in_window(
         raise RecordingError(
             f"recording: has no frame from {begin:g} to {end:g} s; it reaches from {times[0]:g} to {times[-1]:g} s"
         )
-    shown = recording.isel(time=np.flatnonzero(chosen), keypoint=0)
-    order = tuple(name for name in DIMENSIONS if name != "keypoint")
-    position = shown["position"].transpose(*order).values.astype(float)
-    if "velocity" in shown:
-        velocity = shown["velocity"].transpose(*order).values.astype(float)
-    elif chosen.sum() > 1:
-        velocity = differentiated_velocity(position, times[chosen])
-    else:
-        velocity = np.zeros_like(position)
-    return FlightPaths(times[chosen], position, velocity)
+    shown, position, velocity = motion_arrays(recording.isel(time=np.flatnonzero(chosen)), kind=float)
+    return FlightPaths(shown, position, np.zeros_like(position) if velocity is None else velocity)
 
 
 def time_window(

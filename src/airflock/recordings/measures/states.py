@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from airflock.recordings import dataset
 from airflock.recordings.attributes import scenario_document
-from airflock.recordings.dataset import check_recording, differentiated_velocity
+from airflock.recordings.dataset import check_recording
 from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.support import ParameterError, RecordingError, is_number
 
@@ -52,18 +52,12 @@ def track_arrays(recording: xr.Dataset, keypoint: str | None = None) -> TrackArr
         raise RecordingError(f"recording: has {len(names)} keypoints; choose one of {', '.join(names)}")
     if keypoint is not None and keypoint not in names:
         raise RecordingError(f"recording: no keypoint {keypoint}; it has {', '.join(names)}")
-    own = recording.isel(keypoint=0 if keypoint is None else names.index(keypoint))
-    order = ("time", "space", "individual")
-    time = own["time"].values.astype(float)
-    position = own["position"].transpose(*order).values.astype(float)
-    if "velocity" in own:
-        velocity = own["velocity"].transpose(*order).values.astype(float)
-    else:
-        velocity = differentiated_velocity(position, time) if len(time) > 1 else np.full_like(position, np.nan)
+    time, position, known = dataset.motion_arrays(recording, 0 if keypoint is None else names.index(keypoint), float)
+    velocity = np.full_like(position, np.nan) if known is None else known
     placed = np.isfinite(position).all(axis=1)
     present = placed & np.isfinite(velocity).all(axis=1)
     nowhere, unknown = ~placed[:, None, :], ~present[:, None, :]
-    individuals = [str(name) for name in own["individual"].values]
+    individuals = [str(name) for name in recording["individual"].values]
     position, velocity = np.where(nowhere, np.nan, position), np.where(unknown, np.nan, velocity)
     world = scenario_of_recording(recording).world if scenario_document(recording) is not None else None
     box = dataset.box_sides(world, position.shape[1]) if world is not None else None
