@@ -229,17 +229,8 @@ class ShowControl:
             self._fly(self._under_way() + CHECK if self._assign() else CHECK)
         far = self._distances()
         # collisions and contacts are known when the flight is closed
-        figures = (
-            float(far.mean()),
-            float(far.max()),
-            len(far),
-            0,
-            self.struck,
-            0,
-            self.reassignment_count,
-            self.detour_count,
-        )
-        self.shape_reports.append(ShapeReport(self.placed, *figures))
+        counts = (len(far), 0, self.struck, 0, self.reassignment_count, self.detour_count)
+        self.shape_reports.append(ShapeReport(self.placed, float(far.mean()), float(far.max()), *counts))
 
     def finish(self) -> list[ShapeReport]:
         """End the flight with its last sample; the figures of all shapes, with the collisions of their windows."""

@@ -15,7 +15,7 @@ import xarray as xr
 from airflock.parts import FAULTS as KINDS
 from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_dataset
 from airflock.scenarios import MODELS
-from airflock.support import RecordingError, as_error, parse_json_object, shortened
+from airflock.support import RecordingError, as_error, is_number, parse_json_object, shortened
 
 # A file is data from outside: every attribute is read as text and checked, and none of it is
 # executed.
@@ -90,23 +90,23 @@ def recorded_faults(recording: xr.Dataset) -> list[dict[str, Any]]:
     """Return the faults of a flight: kind, agent, begin and end (s; None: it did not end)."""
     found = (_object(recording, FAULTS_ATTRIBUTE) or {}).get("faults", [])
     sound = isinstance(found, list) and all(
-        isinstance(entry, Mapping) and {"kind", "agent", "begin", "end"} <= set(entry) and _instant(entry["begin"])
+        isinstance(entry, Mapping) and {"kind", "agent", "begin", "end"} <= set(entry)
+        and is_number(entry["begin"]) and 0.0 <= entry["begin"] < 1e9
         for entry in found
-    )
+    )  # fmt: skip
     if not sound:
         raise RecordingError(f"recording: attribute {FAULTS_ATTRIBUTE} is damaged: it holds no list of faults")
     return [dict(entry) for entry in found]
 
 
-def faults_line(faults: list[dict[str, Any]], max_faults: int = 6) -> str:
+MAX_NAMED = 6  # faults of a line
+
+
+def faults_line(faults: list[dict[str, Any]]) -> str:
     """Return the faults in one line for a person: kind, agent and time."""
-    lines = [f"{each['kind']} of agent {each['agent']} at {each['begin']:g} s" for each in faults[:max_faults]]
-    more = f", and {len(faults) - max_faults} more" if len(faults) > max_faults else ""
+    lines = [f"{each['kind']} of agent {each['agent']} at {each['begin']:g} s" for each in faults[:MAX_NAMED]]
+    more = f", and {len(faults) - MAX_NAMED} more" if len(faults) > MAX_NAMED else ""
     return f"{len(faults)} fault{'s' if len(faults) > 1 else ''}: {', '.join(lines)}{more}"
-
-
-def _instant(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value < 1e9
 
 
 def uses_user_law(recording: xr.Dataset) -> bool:

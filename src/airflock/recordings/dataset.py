@@ -150,13 +150,13 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
 Array = NDArray[Any]
 
 
-def motion_arrays(recording: xr.Dataset, keypoint: int = 0, kind: Any = None) -> tuple[Array, Array, Array | None]:
-    """Return times (frame,), s, and position and velocity (frame, axis, individual), m and m/s, of a keypoint.
+def motion_arrays(recording: xr.Dataset, kind: Any = None) -> tuple[Array, Array, Array | None]:
+    """Return times (frame,), s, and position and velocity (frame, axis, individual), m and m/s, of the first keypoint.
 
     Velocity is differentiated from position where it is not recorded; None of a single frame.
     kind : type of the numbers; by default that of the recording
     """
-    own = recording.isel(keypoint=keypoint)
+    own = recording.isel(keypoint=0)
     times = own["time"].values.astype(float)
     position, *recorded = (
         np.asarray(own[name].transpose("time", "space", "individual").values, kind)

@@ -110,13 +110,7 @@ def score(
         names = ", ".join(name for name, given in recording_options.items() if given)
         raise RecordingError(f"{names}: needs a recording, such as one from airflock.simulate(scenario)")
     scenario, numbers = scenario_variant(scenario_or_recording, settings, trust=trust), check_seeds(seeds)
-    options: dict[str, Any] = {
-        "threads": threads,
-        "precision": precision,
-        "on_done": done,
-        "device": device,
-        "notify": say,
-    }
+    options = {"threads": threads, "precision": precision, "on_done": done, "device": device, "notify": say}
     rows = score_scenarios([scenario] * len(numbers), numbers, scheduler=scheduler, **options)
     return _about(pd.DataFrame(rows, index=pd.Index(numbers, name="seed")), scenario)
 
@@ -156,8 +150,14 @@ def undefined_metrics_of(
     if scenario_document(recording) is not None:
         return {}
     sampled = (name for metric in scenario.metrics.rule.metrics for name in metric.Sample._fields)
-    names = (*reported_values(scenario.metrics.rule), *sampled)
-    return undefined_metrics(names, scenario.metrics.rule.needs, settings or {}, arena=scenario.world.arena != "none")
+    needs = scenario.metrics.rule.needs
+    missing = {
+        name: tuple(key for key in needs.get(name, ()) if f"metrics.{key}" not in (settings or {}))
+        for name in (*reported_values(scenario.metrics.rule), *sampled)
+    }
+    # Without an arena nobody is ever outside of it.
+    outside = {"phi_wall": ("world.arena",)} if "phi_wall" in missing and scenario.world.arena == "none" else {}
+    return {name: keys for name, keys in missing.items() if keys} | outside
 
 
 PRESENCE_METRICS = {"present_measured": ("", "share that is present, without gaps that the import bridged")}
@@ -373,19 +373,6 @@ def body_length_settings(length: float) -> dict[str, float]:
     if not 0.0 < length <= 1000.0:
         raise RecordingError(f"body_length = {length:g} m lies outside (0, 1000] m")
     return {f"metrics.{key}": share * length for key, share in IN_BODIES.items()}
-
-
-def undefined_metrics(
-    names: Iterable[str], needs: Mapping[str, tuple[str, ...]], settings: Mapping[str, Any], *, arena: bool
-) -> dict[str, tuple[str, ...]]:
-    """Return the order parameters of a set that depend on keys which the settings lack, and these keys.
-
-    needs : of the set
-    arena : whether settings give one, without which nobody is ever outside
-    """
-    missing = {name: tuple(key for key in needs.get(name, ()) if f"metrics.{key}" not in settings) for name in names}
-    outside = {"phi_wall": ("world.arena",)} if "phi_wall" in missing and not arena else {}
-    return {name: keys for name, keys in missing.items() if keys} | outside
 
 
 def missing_lengths_note(undefined: Mapping[str, tuple[str, ...]]) -> str:

@@ -220,7 +220,7 @@ def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable
     every, sample = times["decide_every"], times["sample_every"]
     late = times["delay"] * dt
     stamps = np.full((n, n), np.nan)
-    known: list[tuple[Array | None, Array | None]] = []  # of each frame: own states as measured, and ages (s) of the others'
+    known: list[tuple[Array | None, Array | None]] = []  # of each frame: own states, ages (s) of the others'
 
     def note(end: int) -> None:
         """Note what agents know at all frames before a step."""

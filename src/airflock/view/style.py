@@ -119,21 +119,13 @@ def add_right_axis(axes: Axes, label: str, color: str) -> Axes:
     return other
 
 
-def set_title(axes: Axes, title: str, details: str = "", *, color: str = INK) -> None:
+def set_title(axes: Axes, title: str, details: str = "") -> None:
     """Set the title at the upper left: the subject in bold, details in grey below it."""
     lift = 18.0 if details else 6.0
-    axes.set_title(title, loc="left", fontsize=TITLE_SIZE, fontweight="bold", color=color, pad=lift, parse_math=False)
+    axes.set_title(title, loc="left", fontsize=TITLE_SIZE, fontweight="bold", color=INK, pad=lift, parse_math=False)
     if details:
-        shade = GREY if color == INK else color
-        axes.annotate(
-            details,
-            (0.0, 1.0),
-            (0.0, 6.0),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            fontsize=SMALL_SIZE,
-            color=shade,
-        )
+        place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
+        axes.annotate(details, (0.0, 1.0), (0.0, 6.0), fontsize=SMALL_SIZE, color=GREY, **place)
 
 
 def set_panel_letter(axes: Axes, name: str) -> None:
@@ -155,20 +147,11 @@ def add_legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 
     entries = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
     if not entries:
         return
+    look: dict[str, Any] = {"loc": "best"}
     if above:
-        axes.legend(
-            handles=entries,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 1.0),
-            ncols=columns,
-            frameon=False,
-            fontsize=SMALL_SIZE,
-            handlelength=1.6,
-            columnspacing=1.2,
-            borderaxespad=0.2,
-        )
-    else:
-        axes.legend(handles=entries, loc="best", frameon=False, fontsize=SMALL_SIZE, handlelength=1.6)
+        look = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": columns, "columnspacing": 1.2}
+        look["borderaxespad"] = 0.2
+    axes.legend(handles=entries, frameon=False, fontsize=SMALL_SIZE, handlelength=1.6, **look)
 
 
 def add_colour_bar(
@@ -177,14 +160,13 @@ def add_colour_bar(
     axes: Axes | list[Axes],
     label: str,
     *,
-    color: str = INK,
     shrink: float = 0.8,
     pad: float = 0.02,
 ) -> Colorbar:
     """Add a colour bar beside axes, without a frame."""
     bar = figure.colorbar(shown, ax=axes, shrink=shrink, aspect=32, pad=pad)
-    bar.set_label(label, fontsize=TEXT_SIZE, color=color)
-    bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=color, color=color, length=2.5, width=0.6)
+    bar.set_label(label, fontsize=TEXT_SIZE, color=INK)
+    bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=INK, color=INK, length=2.5, width=0.6)
     bar.outline.set_visible(False)
     return bar
 

@@ -418,11 +418,7 @@ REASONS = {  # how many times too fast → why, and what to write: targets and t
 
 def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
     """Rule 2: along each axis positions change as the velocities say; else name the swap, the sign or the scale."""
-    by_file: dict[str, list[ImportedTrack]] = {}
-    for track in tracks:
-        if track.has(VELOCITY_TARGETS):
-            by_file.setdefault(track.source, []).append(track)
-    for source, own in by_file.items():
+    for source, own in tracks_by_source(track for track in tracks if track.has(VELOCITY_TARGETS)).items():
         # A group is compared as a whole: one individual may fly straight, and show one axis only.
         axes = 3 if all("z" in t.columns and "vz" in t.columns for t in own) else 2
         pairs = [_displacements(track, axes) for track in own]
@@ -698,10 +694,7 @@ def _is_several(track: ImportedTrack, place: Array, jumps: Any, error: Array, fi
         what = f"jumps {len(jumps)} times, first row {track.rows[jumps[0] + 1]}"
     else:
         return False
-    findings.add_error(
-        f"{track.source}: {track.name} {what}: {SEVERAL}",
-        "jumps",
-    )
+    findings.add_error(f"{track.source}: {track.name} {what}: {SEVERAL}", "jumps")
     return True
 
 

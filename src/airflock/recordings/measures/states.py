@@ -41,18 +41,13 @@ class TrackArrays(NamedTuple):
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
 
 
-def track_arrays(recording: xr.Dataset, keypoint: str | None = None) -> TrackArrays:
-    """Return the arrays of a recording; missing velocities are differentiated, and unknown in a single frame.
-
-    keypoint : which one, where there are several
-    """
+def track_arrays(recording: xr.Dataset) -> TrackArrays:
+    """Return the arrays of a recording; missing velocities are differentiated, and unknown in a single frame."""
     check_recording(recording)
     names = [str(name) for name in recording["keypoint"].values]
-    if keypoint is None and len(names) > 1:
+    if len(names) > 1:
         raise RecordingError(f"recording: has {len(names)} keypoints; choose one of {', '.join(names)}")
-    if keypoint is not None and keypoint not in names:
-        raise RecordingError(f"recording: no keypoint {keypoint}; it has {', '.join(names)}")
-    time, position, known = dataset.motion_arrays(recording, 0 if keypoint is None else names.index(keypoint), float)
+    time, position, known = dataset.motion_arrays(recording, float)
     velocity = np.full_like(position, np.nan) if known is None else known
     placed = np.isfinite(position).all(axis=1)
     present = placed & np.isfinite(velocity).all(axis=1)
