@@ -7,6 +7,7 @@ inside lies to the left of each edge. An arena is the first `corners` rows. Dist
 import math
 
 from airflock.world.arena import Surface
+from airflock.world.casts import ray_to_segment
 
 
 def inner(x, y, edges, first, last):
@@ -146,19 +147,10 @@ def ray_to_prism(x, y, z, ux, uy, uz, edges, first, last):
     high = edges[last][1]
     best = 1e30
     for e in range(first, last):
-        ax = edges[e][0] - x
-        ay = edges[e][1] - y
-        tx = edges[e][2] - edges[e][0]
-        ty = edges[e][3] - edges[e][1]
-        cross = ux * ty - uy * tx
-        side = 1.0 if cross > 0.0 else -1.0
-        bound = abs(cross) + 1e-12
-        t = (ax * ty - ay * tx) * side
-        s = (ax * uy - ay * ux) * side
-        if (t >= 0.0) & (s >= 0.0) & (s <= bound):
-            height = z + t / bound * uz
-            if (height >= low) & (height <= high):
-                best = min(best, t / bound)
+        t = ray_to_segment(x, y, ux, uy, edges[e][0], edges[e][1], edges[e][2], edges[e][3])
+        height = z + t * uz
+        if (t < best) & (height >= low) & (height <= high):
+            best = t
     up = 1.0 if uz > 0.0 else -1.0
     end = low if uz > 0.0 else high  # the end that a ray in this direction can come in by
     t = (end - z) * up / (abs(uz) + 1e-12)

@@ -6,6 +6,8 @@ arena needs. Faces are seen from inside; 1e30 means that nothing is in the way.
 
 import math
 
+from airflock.world.casts import ray_to_segment
+
 
 def to_box(x, y, z, ux, uy, uz, half_x, half_y, half_z, edges, corners):
     """Distance (m) to the faces of a box of these half sides about the origin; 0 on a face or beyond it."""
@@ -28,17 +30,7 @@ def to_edges(x, y, ux, uy, edges, first, last):
     """Distance (m) along the ground plan to the nearest of the polygon edges first..last-1 (rows ax ay bx by)."""
     best = 1e30
     for e in range(first, last):
-        ax = edges[e][0] - x
-        ay = edges[e][1] - y
-        tx = edges[e][2] - edges[e][0]
-        ty = edges[e][3] - edges[e][1]
-        cross = ux * ty - uy * tx
-        side = 1.0 if cross > 0.0 else -1.0
-        bound = abs(cross) + 1e-12
-        t = (ax * ty - ay * tx) * side  # both numerators over the same denominator: no division before the test
-        s = (ax * uy - ay * ux) * side
-        if (t >= 0.0) & (s >= 0.0) & (s <= bound):
-            best = min(best, t / bound)
+        best = min(best, ray_to_segment(x, y, ux, uy, edges[e][0], edges[e][1], edges[e][2], edges[e][3]))
     return best
 
 
