@@ -53,11 +53,7 @@ def cast_near(x, y, z, ux, uy, uz, length, radius, shapes, near, n):
     iz = inverse(uz)
     for j in range(n):
         k = near[j]
-        t = entry(
-            x, y, z, ix, iy, iz,
-            shapes[k][0], shapes[k][1], shapes[k][2], shapes[k][3], shapes[k][4], shapes[k][5],
-            radius,
-        )  # fmt: skip
+        t = entry(x, y, z, ix, iy, iz, shapes, k, radius)
         if t < best:
             best = min(best, to_shape(x, y, z, ux, uy, uz, shapes, k, t, best, radius))
     return best
@@ -73,15 +69,9 @@ def cast(x, y, z, ux, uy, uz, length, radius, shapes, nodes, links):
     # `best` shrinks with each hit, so later boxes are skipped by the same test that skips those out
     # of the way.
     while i < len(nodes):
-        s = entry(
-            x, y, z, ix, iy, iz, nodes[i][0], nodes[i][1], nodes[i][2], nodes[i][3], nodes[i][4], nodes[i][5], radius
-        )
-        if s < best:
+        if entry(x, y, z, ix, iy, iz, nodes, i, radius) < best:
             for k in range(links[i][1], links[i][2]):
-                t = entry(
-                    x, y, z, ix, iy, iz,
-                    shapes[k][0], shapes[k][1], shapes[k][2], shapes[k][3], shapes[k][4], shapes[k][5], radius,
-                )  # fmt: skip
+                t = entry(x, y, z, ix, iy, iz, shapes, k, radius)
                 if t < best:
                     best = min(best, to_shape(x, y, z, ux, uy, uz, shapes, k, t, best, radius))
             i += 1

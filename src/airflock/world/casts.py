@@ -19,17 +19,17 @@ def inverse(u):
     return 1.0 / (u if abs(u) > 1e-9 else (1e-9 if u >= 0.0 else -1e-9))
 
 
-def entry(x, y, z, ix, iy, iz, x0, y0, z0, x1, y1, z1, radius):
-    """Distance (m) at which a ray enters a box grown by a radius (m), 0 within, FAR if it does not.
+def entry(x, y, z, ix, iy, iz, boxes, i, radius):
+    """Distance (m) at which a ray enters box i (rows x0 y0 z0 x1 y1 z1 ...) grown by a radius (m); FAR if it does not.
 
-    ix, iy, iz : inverse components of its unit direction
+    It is 0 within. ix, iy, iz : inverse components of its unit direction
     """
-    ax = (x0 - radius - x) * ix
-    bx = (x1 + radius - x) * ix
-    ay = (y0 - radius - y) * iy
-    by = (y1 + radius - y) * iy
-    az = (z0 - radius - z) * iz
-    bz = (z1 + radius - z) * iz
+    ax = (boxes[i][0] - radius - x) * ix
+    bx = (boxes[i][3] + radius - x) * ix
+    ay = (boxes[i][1] - radius - y) * iy
+    by = (boxes[i][4] + radius - y) * iy
+    az = (boxes[i][2] - radius - z) * iz
+    bz = (boxes[i][5] + radius - z) * iz
     # Slabs (Kay & Kajiya 1986): the ray is in the box where it is between all three pairs of faces.
     near = max(min(ax, bx), max(min(ay, by), min(az, bz)))
     far = min(max(ax, bx), min(max(ay, by), max(az, bz)))

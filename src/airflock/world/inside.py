@@ -38,10 +38,7 @@ def winding(x, y, z, ux, uy, uz, shapes, nodes, links):
     iz = inverse(uz)
     i = 0
     while i < len(nodes):
-        s = entry(
-            x, y, z, ix, iy, iz, nodes[i][0], nodes[i][1], nodes[i][2], nodes[i][3], nodes[i][4], nodes[i][5], 0.0
-        )
-        if s < FAR:
+        if entry(x, y, z, ix, iy, iz, nodes, i, 0.0) < FAR:
             for k in range(links[i][1], links[i][2]):
                 if (shapes[k][CLOSED] > 0.5) & (ray_to_shape(x, y, z, ux, uy, uz, shapes, k, 0.0) < FAR):
                     count += outwards(ux, uy, uz, shapes, k)

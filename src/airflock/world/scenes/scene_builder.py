@@ -72,16 +72,10 @@ class Scene:
         return np.array([self.shapes[:, :3].min(axis=0), self.shapes[:, 3:6].max(axis=0)])
 
 
-def box_rows(corners: Any) -> NDArray[np.float64]:
-    """Rows of boxes from (box, 6) lowest and highest corners, m."""
+def box_rows(corners: Any, kind: float = BOX) -> NDArray[np.float64]:
+    """Rows of boxes, or of the ground, from (box, 6) lowest and highest corners, m."""
     given = np.asarray(corners, float).reshape(-1, 6)
-    return _rows(BOX, given, given[:, :0])
-
-
-def ground_row(corners: Any) -> NDArray[np.float64]:
-    """Row of the ground from its (6,) lowest and highest corner, m."""
-    given = np.asarray(corners, float).reshape(-1, 6)
-    return _rows(GROUND, given, given[:, :0])
+    return _rows(kind, given, given[:, :0])
 
 
 def cylinder_rows(values: Any) -> NDArray[np.float64]:
@@ -155,16 +149,21 @@ def _upright(plan: NDArray[np.float64], row: NDArray[Any], every: int) -> list[N
 
 def prism_mesh(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return vertices and triangles of the sides and the roof over a simple ground plan (corner, 2), m."""
-    from shapely import constrained_delaunay_triangles  # here, because most worlds are not drawn
-    from shapely.geometry import Polygon
-
     n = len(corners)
     vertices = np.array([[x, y, z] for z in (low, high) for x, y in corners], np.float32)
     faces = [t for i in range(n) for t in ((i, (i + 1) % n, n + i), ((i + 1) % n, n + (i + 1) % n, n + i))]
     place = {(float(x), float(y)): n + number for number, (x, y) in enumerate(corners)}
-    roof = constrained_delaunay_triangles(Polygon(corners)).geoms if n > 2 else ()
-    faces += [tuple(place[corner] for corner in part.exterior.coords[:3]) for part in roof]  # type: ignore[misc]
+    roof = _triangles(corners) if n > 2 else ()
+    faces += [tuple(place[corner] for corner in part) for part in roof]  # type: ignore[misc]
     return vertices, np.array(faces, np.uint32)
+
+
+def _triangles(corners: Any) -> list[Any]:
+    """Return triangles (three corners each) of a simple polygon, m."""
+    from shapely import constrained_delaunay_triangles  # here, because most worlds have no polygon to triangulate
+    from shapely.geometry import Polygon
+
+    return [part.exterior.coords[:3] for part in constrained_delaunay_triangles(Polygon(corners)).geoms]
 
 
 def _sphere_lines(row: NDArray[Any]) -> list[NDArray[np.float64]]:
@@ -292,22 +291,12 @@ def buildings(p: scenery.Parameters) -> NDArray[np.float64]:
     return box_rows(np.stack([x, y, flat, x + p.block, y + p.block, height], axis=1)[stands])
 
 
-def extent(p: scenery.Parameters) -> float:
-    """Half side of the city with the street around it, m."""
-    return 0.5 * int(p.blocks) * (p.block + p.street)
-
-
-def forest_extent(p: scenery.Parameters) -> float:
-    """Half side of the forest, m."""
-    return 0.5 * p.side
-
-
 def half_side(p: scenery.Parameters, shapes: Any) -> float:
     """Half side (m) of the square that a scene stands on."""
-    if p.kind == "city":
-        return extent(p)
+    if p.kind == "city":  # with the street around it
+        return 0.5 * int(p.blocks) * (p.block + p.street)
     if p.kind == "forest":
-        return forest_extent(p)
+        return 0.5 * p.side
     return float(np.abs(shapes[:, [0, 1, 3, 4]]).max()) if len(shapes) else 0.0
 
 
@@ -335,8 +324,6 @@ def trees(p: scenery.Parameters) -> NDArray[np.float64]:
     crowns = np.stack([x, y, crown, clear * height, height], axis=1)
     return cylinder_rows(np.concatenate([stems, crowns]))
 
-
-__all__ = ["Scene", "clearance", "in_mesh", "scene_of", "waypoints"]
 
 Polygons = tuple[tuple[tuple[float, ...], ...], ...]
 MARGIN = 100.0  # m; the ground reaches beyond the scene, so that no flock slips under it
@@ -381,7 +368,7 @@ def scene_of(
         rows[flat, 2], rows[flat, 5] = -TALL_HEIGHT, TALL_HEIGHT
         return make_scene([rows, *walls], notes)
     half = half_side(p, rows) + MARGIN
-    below = [ground_row([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
+    below = [box_rows([-half, -half, -DEPTH, half, half, 0.0], GROUND)] if p.ground == "yes" else []
     return make_scene([*below, rows, *walls], notes)
 
 
@@ -390,11 +377,7 @@ def _faces(ring: tuple[tuple[float, ...], ...], low: float, high: float) -> list
     pairs = list(zip(ring, ring[1:] + ring[:1], strict=True))
     found = [[(*a, low), (*b, low), (*b, high)] for a, b in pairs]
     found += [[(*a, low), (*b, high), (*a, high)] for a, b in pairs]
-    from shapely import constrained_delaunay_triangles  # here, because most worlds have no polygon to triangulate
-    from shapely.geometry import Polygon
-
-    flat = [part.exterior.coords[:3] for part in constrained_delaunay_triangles(Polygon(ring)).geoms]
-    return found + [[(*corner, z) for corner in part] for part in flat for z in (low, high)]
+    return found + [[(*corner, z) for corner in part] for part in _triangles(ring) for z in (low, high)]
 
 
 def appearance_times(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
@@ -445,11 +428,9 @@ def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> ND
     rng = np.random.default_rng([int(p.seed), 1])
     chosen: list[NDArray[np.float64]] = []
     last = np.zeros(3)
-    vain = 0
-    for _ in range(ATTEMPTS):
-        if vain == IN_VAIN:
-            break
-        vain += 1
+    vain = drawn = 0
+    while vain < IN_VAIN and drawn < ATTEMPTS:
+        vain, drawn = vain + 1, drawn + 1
         spot = np.array(
             [*rng.uniform(-half, half, 2), rng.uniform(g.low, max(g.high, g.low)) if dimensions == 3 else 0.0]
         )
