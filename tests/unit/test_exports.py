@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.recordings import exports as movement, exports as tables
+from airflock.recordings import exports as tables
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def test_tables_come_back_with_the_same_bits(recording, tmp_path, ending):
     if ending == ".parquet":
         pytest.importorskip("pyarrow")
     path = tmp_path / f"tracks{ending}"
-    (tables.write_csv if ending == ".csv" else tables.write_parquet)(recording, path)
+    airflock.export(recording, path)
     back = airflock.load_tracks(path)
     for name in ("position", "velocity", "command"):
         own = recording[name].transpose("time", "space", "keypoint", "individual").values
@@ -76,7 +76,7 @@ def test_a_table_like_a_log_of_px4_comes_back_by_its_axes(recording, tmp_path, s
 
 @pytest.mark.parametrize("old", [False, True])
 def test_both_layouts_of_movement_come_back(recording, tmp_path, old):
-    path = movement.write_movement(recording, tmp_path / "tracks.nc", plural_dimensions=old)
+    path = airflock.export(recording, tmp_path / "tracks.nc", layout="movement-0.16" if old else "movement")
     with xr.open_dataset(path, engine="h5netcdf") as opened:
         assert ("individuals" in opened.dims) == old and opened.attrs["ds_type"] == "poses"
     back = airflock.load_tracks(path)

@@ -9,7 +9,6 @@ import xarray as xr
 
 import airflock
 from airflock.recordings.dataset import make_dataset
-from airflock.recordings.exports import write_movement
 
 
 def straight(frames=50, n=3):
@@ -24,7 +23,7 @@ def test_movement_computes_the_velocities_of_what_we_write(tmp_path):
     kinematics = pytest.importorskip("movement.kinematics")
     found = straight()
     old = tuple(int(part) for part in movement.__version__.split(".")[:2]) < (0, 17)
-    path = write_movement(found, tmp_path / "tracks.nc", plural_dimensions=old)
+    path = airflock.export(found, tmp_path / "tracks.nc", layout="movement-0.16" if old else "movement")
     with xr.open_dataset(path, engine="h5netcdf") as opened:
         theirs = kinematics.compute_velocity(opened.load()["position"])
     names = {"keypoints": "keypoint", "individuals": "individual"}

@@ -1,7 +1,7 @@
 """Write recordings for other tools: long CSV and Parquet tables, and netCDF in both layouts of `movement`."""
 
-import io
 import os
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -51,13 +51,23 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
         raise RecordingError(wrong)
     if layout not in LAYOUTS:
         raise RecordingError(f"layout = {layout!r} is none of {', '.join(LAYOUTS)}")
-    if target.suffix.lower() == ".nc" and layout != "px4":
-        return write_movement(recording, target, plural_dimensions=layout == "movement-0.16")
-    if layout == "px4" and target.suffix.lower() != ".csv":
+    ending = target.suffix.lower()
+    if layout == "px4" and ending != ".csv":
         raise RecordingError(f"layout = 'px4' is a table; {target.name} ends in {target.suffix}: write .csv")
-    if target.suffix.lower() == ".csv":
-        return write_csv(recording, target, px4_columns=layout == "px4")
-    return write_parquet(recording, target)
+    if ending == ".nc":
+        found = to_movement(recording, plural_dimensions=layout == "movement-0.16")
+        atomic.write_file(target, found.to_netcdf(None, engine="h5netcdf"))
+    elif ending == ".csv":
+        table = (to_log_table if layout == "px4" else to_table)(recording)
+        # A spreadsheet runs a cell that begins like a formula, and is no number; an apostrophe makes it a text.
+        table["id"] = table["id"].where(~table["id"].str.match(r"\s*(?![+-]?[\d.]+$)[=+\-@]"), "'" + table["id"])
+        atomic.write_file(target, table.to_csv(index=False))
+    else:
+        if find_spec("pyarrow") is None:
+            raise RecordingError(f"{target}: Parquet needs pyarrow: pip install 'airflock[logs]'")
+        with atomic.atomic_path(target) as temporary:
+            to_table(recording).to_parquet(temporary, index=False, engine="pyarrow")
+    return target
 
 
 COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command": ("cx", "cy", "cz")}
@@ -109,29 +119,6 @@ def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-def write_csv(recording: xr.Dataset, path: str | os.PathLike[str], *, px4_columns: bool = False) -> Path:
-    """Write a long CSV table, with as many digits as the numbers have; `px4_columns` : as a log of PX4 has it."""
-    text = io.StringIO()
-    table = (to_log_table if px4_columns else to_table)(recording)
-    # A spreadsheet runs a cell that begins like a formula, and is no number; an apostrophe makes it a text.
-    table["id"] = table["id"].where(~table["id"].str.match(r"\s*(?![+-]?[\d.]+$)[=+\-@]"), "'" + table["id"])
-    table.to_csv(text, index=False)
-    atomic.write_file(path, text.getvalue())
-    return Path(path)
-
-
-def write_parquet(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a long Parquet table; needs pyarrow."""
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise RecordingError(f"{path}: Parquet needs pyarrow: pip install 'airflock[logs]'") from error
-    with atomic.atomic_path(path) as temporary:
-        to_table(recording).to_parquet(temporary, index=False, engine="pyarrow")
-    return Path(path)
-
-
-STATES = ("position", "velocity", "command")
 PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
 
 
@@ -141,7 +128,7 @@ def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr
     plural_dimensions : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
     """
     check_recording(recording)
-    found = recording[[name for name in STATES if name in recording]].transpose(*DIMENSIONS)
+    found = recording[[name for name in COLUMNS if name in recording]].transpose(*DIMENSIONS)
     if "confidence" in recording:
         found["confidence"] = recording["confidence"].transpose("time", "keypoint", "individual")
     else:
@@ -152,11 +139,3 @@ def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr
         **{name: recording.attrs[name] for name in kept if name in recording.attrs},
     }  # fmt: skip
     return found.rename(PLURAL) if plural_dimensions else found
-
-
-def write_movement(recording: xr.Dataset, path: str | os.PathLike[str], *, plural_dimensions: bool = False) -> Path:
-    """Write a dataset of `movement` as netCDF."""
-    atomic.write_file(
-        path, to_movement(recording, plural_dimensions=plural_dimensions).to_netcdf(None, engine="h5netcdf")
-    )
-    return Path(path)

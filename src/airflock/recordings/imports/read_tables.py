@@ -160,10 +160,9 @@ def tracks_from_parts(
             whole &= np.isfinite(values["t" if "t" in values else "utc"])
             if how.id:
                 nameless.append(rows[whole & piece[how.id].isna().to_numpy()])
-                for own, chosen in _by_name(piece[how.id]):
-                    gathered.setdefault(own, []).append(_taken(values, rows, chosen))
-            else:
-                gathered.setdefault(name, []).append(_taken(values, rows, None))
+            for own, chosen in _by_name(piece[how.id]) if how.id else ((name, slice(None)),):
+                taken_values = {target: array[chosen] for target, array in values.items()}
+                gathered.setdefault(own, []).append((taken_values, rows[chosen]))
     if not gathered:
         unnamed = f"no name in column {how.id}; write --map id:=file" if sum(map(len, nameless)) else "no rows"
         raise RecordingError(f"{where}: has {unnamed}")
@@ -409,11 +408,6 @@ def _by_name(column: Any) -> Iterator[tuple[str, Any]]:
         yield text, order[edges[code] : edges[code + 1]]
 
 
-def _taken(values: dict[str, Any], rows: Any, chosen: Any) -> tuple[dict[str, Any], Any]:
-    every = slice(None) if chosen is None else chosen
-    return {target: array[every] for target, array in values.items()}, rows[every]
-
-
 def _track(
     name: str, where: str, parts: list[Any], how: ColumnLayout, shared: bool, findings: ImportReport
 ) -> ImportedTrack:
@@ -433,11 +427,12 @@ def _track(
     if utc is not None and utc is not time and np.isfinite(utc + time).any():
         pair = np.stack([time, utc], axis=1)[np.isfinite(utc + time)]
     air = columns.pop("air") > 0.5 if "air" in columns else None
-    found = ImportedTrack(name, where, time, columns, rows, how.labels, clock, pair, how.datum)
-    found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
-    found.in_air, found.ground, found.flags, found.fixed_units = air, how.ground, flags, how.fixed_units
-    found.unnamed = frozenset(target for target, source in how.sources.items() if source.bare)
-    return found
+    unnamed = frozenset(target for target, source in how.sources.items() if source.bare)
+    datum = how.datum or ("" if origin is None else "amsl")
+    return ImportedTrack(
+        name, where, time, columns, rows, how.labels, clock, pair, datum, origin, how.fixed_units, how.ground, unnamed,
+        air, flags=flags,
+    )  # fmt: skip
 
 
 DELIMITERS = (",", ";", "\t", "|")
