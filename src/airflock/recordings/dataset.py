@@ -6,7 +6,7 @@ individual) and the attributes fps, time_unit, source_software and ds_type follo
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,15 +46,6 @@ def make_dataset(
         period = float(times[1] - times[0]) if count > 1 else 1.0
     else:
         period, times = times, np.arange(count) * times
-    space = ["x", "y", "z"][:dimensions]
-    coordinates: dict[str, Any] = {
-        "time": ("time", times, {"units": "s"}),
-        "space": space,
-        "keypoint": ["centre"],
-        "individual": [f"agent_{i}" for i in range(agents)],
-    }
-    if groups:
-        coordinates["group"] = ("individual", np.array(groups, str))
     names = ("position", "velocity", "command")
     units = {**VARIABLE_UNITS, "command": COMMANDS.get(command, "1")}
     variables: dict[str, Any] = {
@@ -63,9 +54,26 @@ def make_dataset(
     }
     # Absent agents have nan in the frames; `movement` expects a confidence besides, which is 0 for
     # them.
-    there = np.isfinite(frames[:, None, :dimensions]).all(axis=2).astype(np.float32)  # 0 of those who are absent
-    variables["confidence"] = (("time", "keypoint", "individual"), there)
-    fixed = {"source_software": "airflock", "ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds"}
+    there = np.isfinite(frames[:, :dimensions]).all(axis=1).astype(np.float32)  # 0 of those who are absent
+    individuals = [f"agent_{i}" for i in range(agents)]
+    found = poses(variables, there, times, period, individuals, {"source_software": "airflock", **attributes})
+    return found.assign_coords(group=("individual", np.array(groups, str))) if groups else found
+
+
+def poses(
+    variables: dict[str, Any], confidence: NDArray[Any], times: NDArray[Any], period: float, individuals: Sequence[str],
+    attributes: Mapping[str, Any],
+) -> xr.Dataset:  # fmt: skip
+    """Make a dataset of `movement` of variables with DIMENSIONS, and of a confidence (time, individual).
+
+    times : (time,) s, `period` (s) apart
+    """
+    coordinates = {
+        "time": ("time", times, {"units": "s"}), "space": list("xyz"[: variables["position"][1].shape[1]]),
+        "keypoint": ["centre"], "individual": individuals,
+    }  # fmt: skip
+    variables = {**variables, "confidence": (("time", "keypoint", "individual"), confidence[:, None, :])}
+    fixed = {"ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds"}
     return xr.Dataset(variables, coordinates, {**fixed, **attributes})
 
 

@@ -9,6 +9,7 @@ import pandas as pd
 import xarray as xr
 
 from airflock.recordings.dataset import DIMENSIONS, check_recording
+from airflock.recordings.imports.track import COMPONENTS
 from airflock.support import RecordingError, atomic, suffix_error, to_path
 
 SUFFIXES = (".csv", ".parquet", ".nc")
@@ -70,9 +71,6 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     return target
 
 
-COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command": ("cx", "cy", "cz")}
-
-
 def to_table(recording: xr.Dataset) -> pd.DataFrame:
     """Make a long table: id, t [s], x [m], ..., vx [m/s], ..., cx [m/s], ...; absent individuals have no rows."""
     check_recording(recording)
@@ -82,7 +80,7 @@ def to_table(recording: xr.Dataset) -> pd.DataFrame:
         "id": np.repeat(recording["individual"].values.astype(str), len(times)),
         "t [s]": np.tile(times, count),
     }
-    for variable, names in COLUMNS.items():
+    for variable, names in COMPONENTS.items():
         if variable not in recording:
             continue
         values = recording[variable].transpose(*order).isel(keypoint=0).values
@@ -91,7 +89,7 @@ def to_table(recording: xr.Dataset) -> pd.DataFrame:
             header = f"{names[c]} [{unit}]" if unit else names[c]
             columns[header] = values[:, :, c].reshape(-1)
     table = pd.DataFrame(columns)
-    there = np.isfinite(table[[name for name in table if str(name).split()[0] in COLUMNS["position"]]]).all(axis=1)
+    there = np.isfinite(table[[name for name in table if str(name).split()[0] in COMPONENTS["position"]]]).all(axis=1)
     return table[there].reset_index(drop=True)
 
 
@@ -107,7 +105,7 @@ def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
         "timestamp [us]": np.round(1e6 * table["t [s]"]).astype("int64"),
     }
     headers = {str(name).split()[0]: str(name) for name in table.columns}
-    for x, y, z in COLUMNS.values():
+    for x, y, z in COMPONENTS.values():
         if x not in headers:
             continue
         unit = headers[x].partition(" ")[2]
@@ -128,7 +126,7 @@ def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr
     plural_dimensions : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
     """
     check_recording(recording)
-    found = recording[[name for name in COLUMNS if name in recording]].transpose(*DIMENSIONS)
+    found = recording[[name for name in COMPONENTS if name in recording]].transpose(*DIMENSIONS)
     if "confidence" in recording:
         found["confidence"] = recording["confidence"].transpose("time", "keypoint", "individual")
     else:

@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 
 from airflock.parts.metrics import scalar_names
 from airflock.recordings import attributes, recording_frames, scenario_of_recording
-from airflock.scenarios import Event, Scenario, to_events
+from airflock.scenarios import Scenario, to_events
 from airflock.support import PAGES, RecordingError, atomic, expand_path, suffix_error, suggest
 from airflock.view.agent_colours import (
     CATEGORIES,
@@ -174,21 +174,16 @@ def _cluster_layer(scenario: Scenario, position: NDArray[Any], present: NDArray[
 def _variable_layers(recording: xr.Dataset, stride: int) -> Iterator[ColourLayer]:
     """Return every variable that holds one number for each individual, at each time or for the whole flight."""
     for name, variable in recording.data_vars.items():
-        sizes = dict(variable.sizes)
-        if str(name) in NO_LAYER_VARIABLES or "individual" not in sizes or variable.dtype.kind not in "fiub":
+        if str(name) in NO_LAYER_VARIABLES or "individual" not in variable.dims or variable.dtype.kind not in "fiub":
             continue
-        plain = variable.isel(keypoint=0) if "keypoint" in sizes else variable
-        if str(name) == "command" and "space" in sizes:
-            values, label = np.sqrt((plain.transpose("time", "space", "individual").values ** 2).sum(axis=1)), "command"
-        elif set(plain.dims) == {"time", "individual"}:
-            values, label = plain.transpose("time", "individual").values, str(name)
-        elif set(plain.dims) == {"individual"}:
-            values, label = np.tile(plain.values, (recording.sizes["time"], 1)), str(name)
-        else:
-            continue
-        unit = str(variable.attrs.get("units", ""))
-        shade = number_colours(label, values.astype(float), "" if unit == "1" else unit)
-        yield _to_layer(shade._replace(values=np.zeros(0)), values[::stride].astype(float))
+        plain = variable.isel(keypoint=0) if "keypoint" in variable.dims else variable
+        if name == "command" and "space" in plain.dims:
+            plain = np.sqrt((plain**2).sum("space", skipna=False))
+        if set(plain.dims) <= {"time", "individual"}:
+            values = plain.broadcast_like(recording["time"]).transpose("time", "individual").values.astype(float)
+            unit = str(variable.attrs.get("units", ""))
+            shade = number_colours(str(name), values, "" if unit == "1" else unit)
+            yield _to_layer(shade, values[::stride])
 
 
 def _to_layer(shade: AgentColours, values: NDArray[Any]) -> ColourLayer:
@@ -294,15 +289,18 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
     name = attributes.recording_name(recording)
     speed = np.sqrt((frames[::stride, axes:] ** 2).sum(1))
     mean = np.ma.masked_invalid(speed).mean(axis=1).filled(np.nan)
+    # A longer step between two frames is a jump through a periodic face.
+    leap = 0.5 * float(scenario.world.side) if scenario and scenario.world.edges == "periodic" else None
     nearest, collisions = _nearest_and_collisions(frames[:, :axes], present, period, scenario)
     about = {
         "name": name, "seed": int(recording.attrs["airflock_seed"]) if "airflock_seed" in recording.attrs else None,
         "first": first, "period": every, "shape": packed.shape, "low": packed.low, "quantum": packed.step,
-        "top": _rounded_up(float(np.nanquantile(speed, 0.995))), "ramp": RAMP_STOPS.astype(int).tolist(),
-        "wheel": WHEEL_STOPS.astype(int).tolist(), "blank": NO_VALUE_COLOUR, "way": colour, "ways": ways,
+        "top": float(f"{1.1 * max(float(np.nanquantile(speed, 0.995)), 1e-6):.2g}"),
+        "ramp": RAMP_STOPS.astype(int).tolist(), "wheel": WHEEL_STOPS.astype(int).tolist(),
+        "blank": NO_VALUE_COLOUR, "way": colour, "ways": ways,
         "layers": [_layer_json(layer.colours) for layer in rows], "whole": bool(whole),
         "height": [float(np.nanmin(frames[:, axes - 1])), float(np.nanmax(frames[:, axes - 1]))],
-        "leap": _longest_step(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
+        "leap": leap, "collisions": [[first + t, i, j] for t, i, j in collisions],
         "events": _event_rows(recording, scenario), "stage": stage,
         "charts": _charts({"mean speed (m/s)": mean, "nearest pair (m)": nearest[::stride]}),
     }  # fmt: skip
@@ -400,11 +398,8 @@ def _nearest_and_collisions(
 def _event_rows(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
     """Return the events of a flight: time, s, and text."""
     events = [] if scenario is None else to_events(attributes.recorded_events(recording))[:MAX_EVENTS]
-    return [[event.step * scenario.flight.dt, _event_text(event)] for event in events]
-
-
-def _event_text(event: Event) -> str:
-    return f"{event.kind} " + ", ".join(f"{key} = {value}" for key, value in event.data.items())
+    texts = [f"{event.kind} " + ", ".join(f"{key} = {value}" for key, value in event.data.items()) for event in events]
+    return [[event.step * scenario.flight.dt, text] for event, text in zip(events, texts, strict=True)]
 
 
 def _scene_json(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:
@@ -424,16 +419,6 @@ def _scene_json(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> d
     return {"centre": plain, "span": max(span, 1e-3), "space": axes == 3, "solids": solids, "lines": lines}
 
 
-def _longest_step(scenario: Any) -> float | None:
-    """Return the longest step between two frames that is not a jump through a periodic face, m; None if unbounded."""
-    return 0.5 * float(scenario.world.side) if scenario and scenario.world.edges == "periodic" else None
-
-
 def _rounded(values: NDArray[Any]) -> list[float | None]:
     """Round numbers to five digits, for JSON; null for numbers that are not finite."""
     return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values, float).tolist()]
-
-
-def _rounded_up(value: float) -> float:
-    """Round a value up to two digits."""
-    return float(f"{max(value, 1e-6) * 1.1:.2g}")

@@ -12,10 +12,10 @@ import xarray as xr
 
 from airflock.recordings.imports import reader, table_columns
 from airflock.recordings.imports.read_tables import choose_keypoint, read_frame
+from airflock.recordings.imports.table_columns import SPEED_UNITS
 from airflock.recordings.imports.track import (
-    COMMAND_TARGETS,
+    COMPONENTS,
     POSITION_TARGETS,
-    VELOCITY_TARGETS,
     ImportedTrack,
     ImportOptions,
     ImportReport,
@@ -69,14 +69,23 @@ def read_array(
         scale = table_columns.unit_in_metres("", where, "array", options)
     if errors or rate is None:
         raise RecordingError("\n".join(errors))
-    frames = np.arange(len(values))
-    found = []
-    for number in range(values.shape[1]):
-        own = values[:, number].astype(float) * scale
-        columns = {axis: own[:, c] for c, axis in enumerate(POSITION_TARGETS[: own.shape[1]])}
-        name = names[number] if names else str(number + 1)
-        found.append(ImportedTrack(name, where, frames / rate, columns, frames))
-    return found
+    names = names or [str(number + 1) for number in range(values.shape[1])]
+    return _tracks(where, names, np.arange(len(values)) / rate, {"position": (values, scale)})
+
+
+def _tracks(where: str, names: list[str], time: Any, arrays: dict[str, tuple[Any, float]]) -> list[ImportedTrack]:
+    """Return a track of each individual; arrays : variable → values (frame, individual, axis), and their factor to SI.
+
+    Columns are copies, each for itself, so that memory is given back individual by individual.
+    """
+    return [
+        ImportedTrack(name, where, time, {
+            target: values[:, number, c].astype(float) * factor
+            for variable, (values, factor) in arrays.items()
+            for c, target in enumerate(COMPONENTS[variable][: values.shape[2]])
+        }, np.arange(len(time)))
+        for number, name in enumerate(names)
+    ]  # fmt: skip
 
 
 def _is_heading(values: Any) -> bool:
@@ -275,31 +284,27 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
     if axes not in (["x", "y"], ["x", "y", "z"]):
         raise RecordingError(f"{where}: space has the axes {', '.join(axes)}, not x, y or x, y, z")
     errors: list[str] = []
-    seconds, scale, tracks = np.empty(0), np.nan, []
+    seconds, scale = np.empty(0), np.nan
     with collect_errors(errors):
         seconds = _seconds(found, options, where)
     with collect_errors(errors):
         scale = table_columns.unit_in_metres(str(found["position"].attrs.get("units", "")), where, "position", options)
     if errors:
         raise RecordingError("\n".join(errors))
-    # Variables of unknown unit are ignored rather than guessed; velocities are then differentiated
+    # Variables of unknown unit (frames, pixels) are ignored rather than guessed; velocities are then differentiated
     # from positions.
-    for number, name in enumerate(found["individual"].values):
-        own = found.isel(individual=number)
-        position = own["position"].transpose("time", "space").values.astype(float) * scale
-        columns = {axis: position[:, c] for c, axis in enumerate(axes)}
-        for variable, names in (("velocity", VELOCITY_TARGETS), ("command", COMMAND_TARGETS)):
-            if variable in own and {"time", "space"} == set(own[variable].dims):
-                unit = str(own[variable].attrs.get("units", ""))
-                if unit not in table_columns.SPEED_UNITS:
-                    continue  # of unknown unit (frames, pixels) or no velocity: differentiated instead
-                values = own[variable].transpose("time", "space").values.astype(float) * table_columns.SPEED_UNITS[unit]
-                columns |= {names[c]: values[:, c] for c in range(len(axes))}
-        track = ImportedTrack(str(name), where, seconds, columns, np.arange(len(seconds)))
-        # Airflock's own confidence says which frames were bridged, and no likelihood.
-        if "confidence" in own and not str(found.attrs.get("source_software", "")).startswith("airflock"):
-            track.flags = {"confidence": (table_columns.LIKELY, own["confidence"].values.astype(float))}
-        tracks.append(track)
+    order = ("time", "individual", "space")
+    arrays = {"position": (found["position"].transpose(*order).values, scale)}
+    for variable in ("velocity", "command"):
+        factor = SPEED_UNITS.get(str(found[variable].attrs.get("units", ""))) if variable in found else None
+        if factor is not None and set(order) == set(found[variable].dims):
+            arrays[variable] = (found[variable].transpose(*order).values, factor)
+    tracks = _tracks(where, [str(name) for name in found["individual"].values], seconds, arrays)
+    # Airflock's own confidence says which frames were bridged, and no likelihood.
+    if "confidence" in found and not str(found.attrs.get("source_software", "")).startswith("airflock"):
+        for number, track in enumerate(tracks):
+            likely = found.isel(individual=number)["confidence"].values.astype(float)
+            track.flags = {"confidence": (table_columns.LIKELY, likely)}
     return tracks
 
 

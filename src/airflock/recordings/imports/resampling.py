@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.recordings.dataset import DIMENSIONS, VARIABLE_UNITS, central_difference
+from airflock.recordings.dataset import DIMENSIONS, VARIABLE_UNITS, central_difference, poses
 from airflock.recordings.imports.track import COMMAND_TARGETS, POSITION_TARGETS, VELOCITY_TARGETS, ImportedTrack
 from airflock.recordings.imports.track_checks import median_period
 from airflock.support import RecordingError, trim_heap
@@ -121,18 +121,11 @@ def resample(
     for name in names:
         whole = np.ascontiguousarray(filled.pop(name).transpose(2, 1, 0))
         variables[name] = (DIMENSIONS, whole[:, :, None, :], {"units": VARIABLE_UNITS.get(name, "m/s")})
-    variables["confidence"] = (("time", "keypoint", "individual"), sure[:, None, :])
-    coordinates = {
-        "time": ("time", np.arange(len(times)) * period, {"units": "s"}),
-        "space": list("xyz"[:axes]),
-        "keypoint": ["centre"],
-        "individual": [track.name for track in tracks],
-    }
-    attributes = {"ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds", "airflock_begin": float(times[0])}
     shares: dict[str, Any] = {"present": float((sure > 0.0).mean()), "bridged": float((sure == 0.5).mean())}
     if lost:
         shares |= {"lost": len(lost), "lost_at": lost[0][1], "apart": max(lost)[0]}
-    return xr.Dataset(variables, coordinates, attributes), shares
+    begin, instants = {"airflock_begin": float(times[0])}, np.arange(len(times)) * period
+    return poses(variables, sure, instants, period, [track.name for track in tracks], begin), shares
 
 
 def _lonely_rows(track: ImportedTrack, times: Any, period: float, bridge: float) -> list[tuple[float, str]]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from airflock.support import RecordingError
 
 POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS = ("x", "y", "z"), ("vx", "vy", "vz"), ("cx", "cy", "cz")
+COMPONENTS = {"position": POSITION_TARGETS, "velocity": VELOCITY_TARGETS, "command": COMMAND_TARGETS}
 GEODETIC_TARGETS = ("lat", "lon", "alt")
 OTHER_TARGETS = ("utc", "air", "id", "receiver", "frame")
 TARGETS = ("t", *POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS, *GEODETIC_TARGETS, *OTHER_TARGETS)
