@@ -35,7 +35,7 @@ PICKLES = (".pkl", ".pickle")
 
 
 def refuse_archive(path: Path) -> None:
-    """Raise a RecordingError for an archive; one of NumPy's (.npz) is none."""
+    """Raise a RecordingError for an archive, where one of NumPy's (.npz) is none, and for what is called a pickle."""
     with path.open("rb") as file:
         start = file.read(4)
     for mark, what in STARTS.items():
@@ -43,10 +43,6 @@ def refuse_archive(path: Path) -> None:
             raise RecordingError(f"{path}: is {what} {path.name}")
     if path.suffix.lower() in ARCHIVES:
         raise RecordingError(f"{path}: is an archive; unpack it first")
-
-
-def refuse_pickle_file(path: Path) -> None:
-    """Raise a RecordingError for a file that is called a pickle."""
     if path.suffix.lower() in PICKLES:
         raise RecordingError(
             f"{path}: holds pickled Python objects, which could run code when read; if you trust the file and it is a "
@@ -132,7 +128,6 @@ class ReaderProcess:
             )
         with as_error(self.path, RecordingError):
             refuse_archive(self.path)
-            refuse_pickle_file(self.path)
         self.limit = LEAST_TIME + self.path.stat().st_size / pace if limit is None else limit
         posix = hasattr(os, "sysconf")  # Windows does not tell its memory: 8 GB there
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if posix else 8 << 30

@@ -131,10 +131,7 @@ def _of_recording(
     settings = power_settings(recording, settings) if aero else settings
     scenario = scenario_of_recording(recording, settings, trust=trust)
     if groups:
-        table = _about(group_scores(recording, settings, trust=trust), scenario)
-        for place, about in (("units", 0), ("meanings", 1)):
-            table.attrs[place] |= {name: texts[about] for name, texts in PAIR_METRICS.items()}
-        return table
+        return _about(group_scores(recording, settings, trust=trust), scenario)
     table = _about(pd.DataFrame([measure_recording(recording, settings, trust=trust)[0]]), scenario)
     table.attrs["not_told"] = undefined_metrics_of(recording, scenario, settings)
     return table
@@ -189,7 +186,9 @@ def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """Add units and meanings of the columns to the attributes of a table."""
     of_courses = {name: about for each in scenario.metrics.rule.metrics for name, about in each.courses.items()}
-    return with_units(table, of_courses | dict(reported_values(scenario.metrics.rule)) | PRESENCE_METRICS)
+    return with_units(
+        table, of_courses | dict(reported_values(scenario.metrics.rule)) | PRESENCE_METRICS | PAIR_METRICS
+    )
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:

@@ -84,8 +84,7 @@ def series(
     _rotation(lower, course, style.PURPLE, ROTATION_LABEL, pen)
     _mark_faults(recording, course, upper, lower)
     lower.set_xlim(float(course.index[0]), float(course.index[-1]) if len(course) > 1 else None)
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
-    return style.root_figure(figure)
+    return pen.titled(figure, recording)
 
 
 def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower: Axes) -> None:
@@ -117,10 +116,10 @@ class SmoothedLines:
         self.count = round(seconds / period) if period > 0.0 else 0
         self.window_seconds = self.count * period
 
-    @property
-    def window_text(self) -> str:
-        """Words of the title that describe the window."""
-        return f" · means over {self.window_seconds:.3g} s" if self.count > 1 else ""
+    def titled(self, figure: Figure, recording: xr.Dataset) -> Figure:
+        """Set the title of a figure, which names the window; return the whole figure."""
+        window = f" · means over {self.window_seconds:.3g} s" if self.count > 1 else ""
+        return style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{window}")
 
     def draw(self, axes: Axes, values: pd.Series, color: str, label: str, *, least: bool = False) -> list[Any]:
         """Draw one course: its mean (or its least value) over the window around each instant. Returns its line."""
@@ -155,8 +154,7 @@ def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax:
         if spread < MIN_RELATIVE_SPREAD * abs(middle):  # rounding is no course
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
     figure.align_ylabels(list(panels))
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
-    return style.root_figure(figure)
+    return pen.titled(figure, recording)
 
 
 def rotations(
@@ -258,8 +256,7 @@ def flocked(
     lower.set_ylim(bottom=0.0)
     style.style_axes(lower, "time (s)", "number")
     style.add_legend(lower, lower.get_lines(), columns=2)
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
-    return style.root_figure(figure)
+    return pen.titled(figure, recording)
 
 
 METRIC_UNITS = {name: unit or "1" for metric in METRICS.values() for name, (unit, _) in metric.reports.items()}
@@ -430,16 +427,15 @@ def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Fig
         )
         style.set_figure_title(figure, short_name(scenario), "transfer functions of the fitness")
     lowest = -3.0 * s if scenario is None else 0.0  # an excursion is never negative
-    judge: Any = (lambda x: rising(x, v0, d), lambda x: bell(x, s), lambda x: peak(x, a))
-    spans = (np.linspace(0.0, 1.4 * v0, 561), np.linspace(lowest, 3.0 * s, 601), np.linspace(0.0, 6.0 * a, 601))
-    names = (r"$F_1(\phi, \phi_0, d)$", r"$F_2(\phi, s)$", r"$F_3(\phi, a)$")
-    curves = zip(spans, judge, names, (style.BLUE, style.GREEN, style.RED), strict=True)
-    marks = (
-        ((v0 - d, 0.0, r"$\phi_0 - d$"), (v0, 1.0, r"$\phi_0$")),
-        ((s, float(np.exp(-1.0)), r"$s,\ 1/e$"),),
-        ((a, 0.25, r"$a,\ 1/4$"),),
-    )
-    for axes, (x, rule, name, color), label, points in zip(panels, curves, labels, marks, strict=True):
+    curves: Any = (
+        (r"$F_1(\phi, \phi_0, d)$", style.BLUE, (0.0, 1.4 * v0, 561), lambda x: rising(x, v0, d),
+         ((v0 - d, 0.0, r"$\phi_0 - d$"), (v0, 1.0, r"$\phi_0$"))),
+        (r"$F_2(\phi, s)$", style.GREEN, (lowest, 3.0 * s, 601), lambda x: bell(x, s),
+         ((s, float(np.exp(-1.0)), r"$s,\ 1/e$"),)),
+        (r"$F_3(\phi, a)$", style.RED, (0.0, 6.0 * a, 601), lambda x: peak(x, a), ((a, 0.25, r"$a,\ 1/4$"),)),
+    )  # fmt: skip
+    for axes, label, (name, color, span, rule, points) in zip(panels, labels, curves, strict=True):
+        x = np.linspace(*span)
         axes.plot(x, [rule(float(v)) for v in x], color=color, linewidth=1.8)
         for px, py, text in points:
             axes.plot([px], [py], "o", color=style.INK, markersize=4.0)

@@ -41,8 +41,7 @@ def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> F
         style.set_panel_letter(axes, name)
     verdict = "shown" if certificate.shown else "not shown"
     details = f"{verdict}, {100.0 * certificate.campaign.confidence:g} % confidence"
-    style.set_figure_title(figure, certificate.campaign.scenario.name, details)
-    return style.root_figure(figure)
+    return style.set_figure_title(figure, certificate.campaign.scenario.name, details)
 
 
 def _bounds(axes: Axes, certificate: "Certificate") -> None:
@@ -66,8 +65,7 @@ def _bounds(axes: Axes, certificate: "Certificate") -> None:
     axes.set_ylim(
         min([look.low for v in certificate.verdicts for look in v.looks if look.low > 0.0] + shown) / 3.0, 1.0
     )
-    style.style_axes(axes, "flights", "probability of a flight with an event")
-    style.add_legend(axes)
+    style.style_axes(axes, "flights", "probability of a flight with an event", legend=True)
 
 
 def _distances(axes: Axes, certificate: "Certificate") -> None:
@@ -198,8 +196,7 @@ def plot_identified(result: IdentifyResult, check: LogCheck | None = None, *, ax
     _order(axes[5], check)
     for panel, name in zip(axes, "ABCDEF", strict=True):
         style.set_panel_letter(panel, name)
-    style.set_figure_title(figure, "identified", f"{result.logs.drones} drones, like {result.like.name}")
-    return style.root_figure(figure)
+    return style.set_figure_title(figure, "identified", f"{result.logs.drones} drones, like {result.like.name}")
 
 
 def _empty(panel: Axes, text: str) -> None:
@@ -231,8 +228,7 @@ def _draw_step_response(panel: Axes, logs: FlightLogs, result: IdentifyResult) -
     panel.step(time, logs.command[rows, 0], where="post", color=style.GREY, linewidth=0.8, label="commanded")
     panel.plot(time, logs.velocity[rows, 0], color=style.BLUE, linewidth=0.9, label="logged")
     panel.plot(time, computed, color=style.RED, linewidth=1.0, linestyle="--", label="computed without noise")
-    style.style_axes(panel, "time (s)", "velocity east (m/s)")
-    style.add_legend(panel)
+    style.style_axes(panel, "time (s)", "velocity east (m/s)", legend=True)
 
 
 def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
@@ -262,8 +258,7 @@ def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> N
     line = np.linspace(0.0, float(edges[-1]), 100)
     panel.plot(line, np.minimum(line, value["a_max"]), color=style.RED, linewidth=1.0, label="fit")
     panel.set_ylim(*np.quantile(pull, [0.01, 0.99]))
-    style.style_axes(panel, "gap / tau (m/s²)", "acceleration along the gap (m/s²)")
-    style.add_legend(panel)
+    style.style_axes(panel, "gap / tau (m/s²)", "acceleration along the gap (m/s²)", legend=True)
 
 
 def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
@@ -300,8 +295,7 @@ def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
     panel.plot(lags, seen, "o", color=style.BLUE, markersize=4.0, label="log")
     panel.axhline(2.0 * value["white"] ** 2, color=style.GREY, linewidth=0.7, linestyle=":", label="noise of the log")
     panel.set_ylim(bottom=0.0)
-    style.style_axes(panel, "lag (s)", "square of prediction error (m²/s²)")
-    style.add_legend(panel)
+    style.style_axes(panel, "lag (s)", "square of prediction error (m²/s²)", legend=True)
 
 
 def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
@@ -336,8 +330,7 @@ def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
     panel.plot(lags, seen, "o", color=style.BLUE, markersize=3.5, label="on the ground")
     panel.set_xscale("log")
     panel.set_ylim(bottom=0.0)
-    style.style_axes(panel, "lag (s)", "variogram of velocity (m²/s²)")
-    style.add_legend(panel)
+    style.style_axes(panel, "lag (s)", "variogram of velocity (m²/s²)", legend=True)
 
 
 def _reception(panel: Axes, result: IdentifyResult) -> None:
@@ -349,8 +342,7 @@ def _reception(panel: Axes, result: IdentifyResult) -> None:
     panel.plot(bins["distance"], bins["share"], ".", color=style.BLUE, markersize=3.0, label="log")
     panel.plot(bins["distance"], bins["model"], color=style.RED, linewidth=1.0, label="fit")
     panel.set_ylim(0.0, 1.05)
-    style.style_axes(panel, "distance (m)", "heard in one decision (1)")
-    style.add_legend(panel)
+    style.style_axes(panel, "distance (m)", "heard in one decision (1)", legend=True)
 
 
 def _order(panel: Axes, check: LogCheck | None) -> None:
@@ -365,8 +357,7 @@ def _order(panel: Axes, check: LogCheck | None) -> None:
     )
     panel.plot(time, check.polarisation[:length], color=style.BLUE, linewidth=0.7, label="log")
     panel.set_ylim(0.0, 1.05)
-    style.style_axes(panel, "time (s)", "polarisation (1)")
-    style.add_legend(panel)
+    style.style_axes(panel, "time (s)", "polarisation (1)", legend=True)
 
 
 MAX_LAWS = 5  # laws that are drawn
@@ -400,8 +391,7 @@ def plot_inferred(result: InferResult, *, ax: Axes | None = None) -> Figure:
                 panel.set_xlabel("left – right (m)", fontsize=style.SMALL_SIZE)
         panels[part][0].set_ylabel("back – front (m)", fontsize=style.SMALL_SIZE)
         style.add_colour_bar(figure, drawn, list(panels[part]), f"acceleration {what} (m/s²)", shrink=0.85)
-    style.set_figure_title(figure, "inferred", result.verdict)
-    return style.root_figure(figure)
+    return style.set_figure_title(figure, "inferred", result.verdict)
 
 
 MIN_PAIRS = 10  # pairs of a bin below which it is not drawn
@@ -447,10 +437,9 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
     style.style_axes(lower, "distance (m)", "heard so far")
     lower.set_xlim(0.0, float(x[-1]) if len(x) else None)
     if isinstance(heard, xr.Dataset):
-        style.set_figure_title(figure, short_name(heard), title_details(heard))
-    else:
-        style.set_figure_title(figure, "reception", f"{len(heard)} rows, {heard['receiver'].nunique()} receivers")
-    return style.root_figure(figure)
+        return style.set_figure_title(figure, short_name(heard), title_details(heard))
+    rows = f"{len(heard)} rows, {heard['receiver'].nunique()} receivers"
+    return style.set_figure_title(figure, "reception", rows)
 
 
 def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:

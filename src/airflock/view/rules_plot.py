@@ -182,8 +182,7 @@ def rules(
     for axes, (title, draw), name in zip(panels[0], draws, "ABCDEFGH", strict=False):
         draw(axes)
         style.set_panel_letter(axes, f"{name}  {title}")
-    style.set_figure_title(figure, short_name(scenario), f"rules of {model.name} against distance")
-    return style.root_figure(figure)
+    return style.set_figure_title(figure, short_name(scenario), f"rules of {model.name} against distance")
 
 
 def _largest_distance(scenario: Scenario) -> float:
@@ -250,8 +249,7 @@ def _wall_panel(axes: Axes, *, model: Model, p: Any, r: Array, v: float, unit: s
     distance = np.linspace(-0.1 * reach, reach, CURVE_POINTS)
     _draw_shares(axes, distance, v, partial(wall_curve, model, p, distance), "{:.3g} m/s towards it")
     axes.axvspan(float(distance[0]), 0.0, color=style.PALE_GREY, alpha=0.6, linewidth=0.0)
-    style.style_axes(axes, "distance to the wall (m)", f"wall term ({unit})")
-    style.add_legend(axes)
+    style.style_axes(axes, "distance to the wall (m)", f"wall term ({unit})", legend=True)
 
 
 def _draw_shares(axes: Axes, at: Array, v: float, curve: Callable[[float], list[RuleResponse]], label: str) -> None:

@@ -40,8 +40,7 @@ def convergence(
         axes.plot(groups.mean(), color=color, linewidth=1.6, label=f"run {run}: mean, 10 to 90 %")
         axes.plot(best, color=color, linewidth=1.0, linestyle="--", label=f"run {run}: best so far")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))  # half a generation is none
-    style.style_axes(axes, "generation", objective)
-    style.add_legend(axes)
+    style.style_axes(axes, "generation", objective, legend=True)
     style.set_title(axes, what or "Convergence", f"{len(table)} candidates")
     return figure
 
@@ -93,8 +92,9 @@ def fitness_scatter(
     for axes in panels[len(units) :]:
         axes.set_visible(False)
     style.add_colour_bar(figure, dots, panels.tolist(), "generation")
-    style.set_figure_title(figure, what or "Fitness against parameters", f"{len(table)} candidates; line: chosen")
-    return style.root_figure(figure)
+    return style.set_figure_title(
+        figure, what or "Fitness against parameters", f"{len(table)} candidates; line: chosen"
+    )
 
 
 CELLS_PER_AXIS = 14
@@ -156,8 +156,7 @@ def slices(
             axes.tick_params(labelbottom=row == n - 1, labelleft=column == 0, labelsize=style.SMALL_SIZE - 2.0)
     if mesh is not None:
         style.add_colour_bar(figure, mesh, drawn, f"best {objective} in each cell")
-    style.set_figure_title(figure, what or "Pairwise slices", "grey: no candidate there; cross: chosen")
-    return style.root_figure(figure)
+    return style.set_figure_title(figure, what or "Pairwise slices", "grey: no candidate there; cross: chosen")
 
 
 def _best_in_cells(
@@ -200,5 +199,4 @@ def pareto(
         axes.plot(table[x], table[y], ".", color=style.GREY, markersize=1.5, alpha=0.4, rasterized=True)
         axes.plot(best[x], best[y], "o", color=style.BLUE, markersize=4.0, markeredgewidth=0.0, label="front")
         style.style_axes(axes, x, y)
-    style.set_figure_title(figure, what or "Pareto front", f"{len(best)} of {len(table)} candidates")
-    return style.root_figure(figure)
+    return style.set_figure_title(figure, what or "Pareto front", f"{len(best)} of {len(table)} candidates")

@@ -93,8 +93,8 @@ def root_figure(figure: Figure) -> Figure:
     return figure.get_figure(root=True)
 
 
-def style_axes(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> None:
-    """Set labels with units, thin grey spines, and a faint grid behind the data."""
+def style_axes(axes: Axes, x: str = "", y: str = "", *, grid: bool = True, legend: bool = False) -> None:
+    """Set labels with units, thin grey spines, a faint grid behind the data, and a legend where it hides least."""
     axes.set_xlabel(x, fontsize=TEXT_SIZE, color=INK)
     axes.set_ylabel(y, fontsize=TEXT_SIZE, color=INK)
     axes.tick_params(labelsize=SMALL_SIZE, color=GREY, labelcolor=INK, length=3, width=0.6)
@@ -105,6 +105,8 @@ def style_axes(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> No
     axes.set_axisbelow(True)
     if grid:
         axes.grid(True, color=PALE_GREY, linewidth=0.5, alpha=0.7)
+    if legend:
+        add_legend(axes)
 
 
 def add_right_axis(axes: Axes, label: str, color: str) -> Axes:
@@ -133,13 +135,17 @@ def set_panel_letter(axes: Axes, name: str) -> None:
     axes.set_title(name, loc="left", fontsize=TEXT_SIZE, fontweight="bold", color=INK, pad=6.0)
 
 
-def set_figure_title(figure: Figure, heading: str, details: str = "") -> None:
-    """Set the title of several panels: the subject in bold, details behind it; both may hold any character."""
+def set_figure_title(figure: Figure, heading: str, details: str = "") -> Figure:
+    """Set the title of several panels: the subject in bold, details behind it; both may hold any character.
+
+    Returns the whole figure that the panels are drawn in.
+    """
     look: dict[str, Any] = {"fontsize": TEXT_SIZE + 0.5, "color": INK, "parse_math": False}
     title = figure.suptitle(heading, x=0.01, ha="left", fontweight="bold", **look)
     if details:
         behind = Annotation(details, (1.0, 0.0), (10.0, 0.0), title, "offset points", va="bottom", **look)
         figure.add_artist(behind)
+    return root_figure(figure)
 
 
 def add_legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 4, *, above: bool = False) -> None:

@@ -36,7 +36,7 @@ from airflock.recordings.imports.track import (
     ignore_progress,
 )
 from airflock.recordings.imports.track_checks import SINCE_1970, SLOW
-from airflock.recordings.reader_process import refuse_archive, refuse_pickle_file
+from airflock.recordings.reader_process import refuse_archive
 from airflock.support import RecordingError, as_error, expand_path, is_number
 
 
@@ -459,7 +459,6 @@ def read_file(path: Path, options: ImportOptions, findings: ImportReport) -> lis
     if not path.is_file():
         raise RecordingError(f"{path}: no such file")
     refuse_archive(path)
-    refuse_pickle_file(path)
     with as_error(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged
         tracks: list[ImportedTrack] = _reader_of(path)(path, options, findings)
     return tracks
