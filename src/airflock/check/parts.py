@@ -1,7 +1,8 @@
 """The standing lists of bodies, sensors, radios, topologies, faults and order parameters, a table of truths a kind."""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
@@ -19,7 +20,6 @@ from airflock.check.truths import (
     rescaled,
     rescaled_scenario,
     rotation_about_vertical,
-    run_truths,
     standing_list,
     unit_factor,
 )
@@ -35,7 +35,6 @@ from airflock.core import (
     MetricSet,
     Quantity,
     State,
-    Topology,
     add_errors,
     call_measure,
     call_rule,
@@ -50,6 +49,16 @@ from airflock.support import ScenarioError
 
 T = TypeVar("T")
 AXES = "xyz"
+Arguments = Mapping[str, Any]
+Case = tuple[str, Arguments]  # kind of a rule, and its arguments by name
+# Units of what rules return, by their kind; others return plain numbers.
+STATE_UNITS = ("m",) * 3 + ("m/s",) * 3
+ANSWERS = {
+    **dict.fromkeys(("sense", "tell", "see"), STATE_UNITS), **dict.fromkeys(("late", "clock", "leaves"), ("s",)),
+    **dict.fromkeys(("move", "overrule", "motion"), ("m/s",) * 3), "carry": ("m",) * 3, "radio": ("m",) * 2,
+}  # fmt: skip
+UNIT = re.compile(r", (m/s|m|s)(?=[,;]|$)")  # in the text of an argument in the vocabulary
+SHIFT = {"x": 1234.0, "y": -567.0, "z": 89.0}  # m
 
 
 def find_part(kind: Kind[T], source: Any) -> T:
@@ -60,32 +69,68 @@ def find_part(kind: Kind[T], source: Any) -> T:
     return part
 
 
+def part_to_check(kind: Kind[T], source: Any, values: Any, seed: int) -> tuple[T, Any, np.random.Generator]:
+    """Return a part with the numbers that a caller gives, and the random numbers of its cases."""
+    part: Any = find_part(kind, source)
+    section = kind.section or "fault"
+    numbers = parameters_with_values(part.Parameters or TopologyParameters, values, section)
+    return part, numbers, np.random.default_rng(check_seed(seed))
+
+
 def rules_of(part: Any, kinds: Any) -> dict[str, Any]:
     """Return those rules of these kinds that a part has."""
     return {kind: rule for kind in kinds if (rule := getattr(part, kind, None)) is not None}
 
 
+def named(name: str, vector: Any) -> dict[str, float]:
+    """Return the arguments by which a rule is handed a vector."""
+    return {f"{name}{axis}": float(component) for axis, component in zip(AXES, vector, strict=False)}
+
+
+def in_other_units(case: Case, units: UnitScale, command: str) -> Case:
+    """Return a case in other units; the vocabulary says the unit of each argument. command : unit of a command"""
+    scaled = dict(case[1])
+    for name, text in VOCABULARY[case[0]].items():
+        unit = UNIT.search(text)
+        if hasattr(scaled.get(name), "__dataclass_fields__"):
+            scaled[name] = rescaled(scaled[name], units)
+        elif name in scaled and (unit or "COMMAND" in text):
+            scaled[name] *= unit_factor(unit[1] if unit else command, units)
+    return case[0], scaled
+
+
+def shifted(case: Case) -> Case:
+    """Return a case in which all positions are shifted."""
+    kind, given = case
+    places = {f"{at}{axis}": by for at in ("", "at_") for axis, by in SHIFT.items()}
+    return kind, {name: value + places.get(name, 0.0) if name in places else value for name, value in given.items()}
+
+
+def rule_trials(
+    part: Any, rules: Mapping[str, Any], letter: str, numbers: Any, cases: Sequence[Case], seed: int,
+    answer: Callable[[Any, Case], Array] | None = None, *, command: str = "m/s", **how: Any,
+) -> Trials:  # fmt: skip
+    """Return trials of single rules on cases; `how` are further fields of the trials.
+
+    answer : of a case, if it is not what its rule returns; command : unit of a command
+    """
+
+    def returned(numbers: Any, case: Case) -> Array:
+        made = call_rule(rules[case[0]], case[0], {**case[1], letter: numbers}, part.name)
+        return np.atleast_1d(np.array(made, float))
+
+    def scale(units: UnitScale, case: Case) -> tuple[Case, Array]:
+        by = [unit_factor(unit, units) for unit in ANSWERS.get(case[0], ("1",))]
+        return in_other_units(case, units, command), np.array(by)
+
+    givens = [given for _, given in cases[: 5 * len(rules) : len(rules)]]
+    return Trials(part, rules, letter, numbers, answer or returned, cases, seed, scale, givens, **how)
+
+
 MOTIONS = 40  # random motions that each truth is tried on
 REMEMBERED = 5  # steps after which a body that remembers is looked at
 WING = Wing()
-VECTORS = {"v": "m/s", "m": "m/s", "c": "", "g": "1", "w": "m/s"}  # what `move` may ask for; c: as ACCEPTS says
-
-
-class Motion(NamedTuple):
-    """Vectors by name, time step (s) and wing that `move` may ask for."""
-
-    vectors: Mapping[str, Array]
-    dt: float = 0.02
-    wing: Any = WING
-
-    def mapped(self, change: Any) -> "Motion":
-        """Return the motion with all vectors changed."""
-        return self._replace(vectors={name: change(vector) for name, vector in self.vectors.items()})
-
-    def arguments(self, memory: Any) -> dict[str, Any]:
-        """Return everything that `move` may ask for, by name, but the body's parameters."""
-        numbers = {f"{k}{a}": float(v[c]) for k, v in self.vectors.items() for c, a in enumerate(AXES)}
-        return {**numbers, "dt": self.dt, "memory": memory, "wing": self.wing}
+VECTORS = "vmcgw"  # what `move` may ask for
 
 
 @standing_list(BODIES)
@@ -103,63 +148,57 @@ def check_body(body: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     >>> airflock.check_body("multirotor").broken
     ()
     """
-    part = find_part(BODIES, body)
-    b = parameters_with_values(part.Parameters, parameters, "body")
+    part, b, rng = part_to_check(BODIES, body, parameters, seed)
     speed = float(min(getattr(b, "speed", getattr(b, "speed_max", 5.0)), 5.0))
-    rng = np.random.default_rng(check_seed(seed))
+    memory = part.Memory() if part.Memory is not None else None
 
-    def draw() -> Motion:
+    def draw() -> Case:
         vectors = {name: (1.0 if name == "g" else speed) * rng.normal(size=3) for name in VECTORS}
         if part.accepts == "heading":
             vectors["c"] /= np.linalg.norm(vectors["c"])
-        return Motion(vectors)
+        given: dict[str, Any] = {"dt": 0.02, "memory": memory, "wing": WING}
+        return "move", given | {key: value for name in VECTORS for key, value in named(name, vectors[name]).items()}
 
-    def fly(b: Any, motion: Motion, steps: int = REMEMBERED if part.Memory is not None else 1) -> Array:
+    def fly(b: Any, motion: Case, steps: int = 1 if memory is None else REMEMBERED) -> Array:
         """Velocity (m/s) after some steps, from the Memory at the start."""
-        memory = part.Memory() if part.Memory is not None else None
+        given = {**motion[1], "b": b}
         for _ in range(steps):
-            moved = call_rule(part.move, "move", {**motion.arguments(memory), "b": b}, part.name)
-            velocity, memory = np.array(moved[:3]), moved[3] if part.Memory is not None else None
-            motion = motion._replace(vectors={**motion.vectors, "v": velocity, "m": velocity})
-        return velocity
+            moved = call_rule(part.move, "move", given, part.name)
+            given |= named("v", moved) | named("m", moved) | ({} if memory is None else {"memory": moved[3]})
+        return np.array(moved[:3])
 
-    def scale(units: UnitScale, motion: Motion) -> tuple[Motion, Array]:
-        by = {name: unit_factor(unit or COMMANDS[part.accepts], units) for name, unit in VECTORS.items()}
-        vectors = {name: by[name] * vector for name, vector in motion.vectors.items()}
-        return Motion(vectors, motion.dt * units.second, rescaled(WING, units)), np.full(3, by["v"])
+    def turned(by: Array) -> str:
+        def change(motion: Case) -> Case:
+            vectors = {name: by @ [motion[1][f"{name}{axis}"] for axis in AXES] for name in VECTORS}
+            return "move", {**motion[1], **{k: v for name in VECTORS for k, v in named(name, vectors[name]).items()}}
+
+        return trials.same(change, lambda velocity: by @ velocity)
 
     def rest() -> str:
-        after = fly(b, Motion({name: np.zeros(3) for name in VECTORS}))
+        still = {f"{name}{axis}": 0.0 for name in VECTORS for axis in AXES}
+        after = fly(b, ("move", {**trials.cases[0][1], **still}))
         return "" if np.isfinite(after).all() else f"the velocity is {after}"
 
     def time_step() -> str:
-        for number, motion in enumerate(trials.cases[:10]):  # without noise, over a tenth of a second
-            quiet = motion._replace(vectors={**motion.vectors, "g": np.zeros(3), "m": motion.vectors["v"]})
-            ends = [fly(b, quiet._replace(dt=0.1 / steps), steps) for steps in (2, 4, 8, 16)]
+        for number, (_, motion) in enumerate(trials.cases[:10]):  # without noise, over a tenth of a second
+            quiet = motion | named("g", np.zeros(3)) | named("m", [motion[f"v{axis}"] for axis in AXES])
+            ends = [fly(b, ("move", quiet | {"dt": 0.1 / steps}), steps) for steps in (2, 4, 8, 16)]
             off = [float(np.abs(x - y).max()) for x, y in zip(ends, ends[1:], strict=False)]
             if off[-1] > max(0.6 * off[0], 1e-9):
                 return f"motion {number}: velocities change by {off[0]:.2g}, then {off[1]:.2g}, {off[2]:.2g} m/s"
         return ""
 
-    trials = Trials(
-        part.name, {"move": part.move}, b, fly, [draw() for _ in range(MOTIONS)], seed, scale, floor=1e-3
+    cases = [draw() for _ in range(MOTIONS)]
+    trials = rule_trials(
+        part, {"move": part.move}, "b", b, cases, seed, fly, command=COMMANDS[part.accepts], floor=1e-3
     )  # fmt: skip
-    memory = part.Memory() if part.Memory is not None else None
-    givens = [motion.arguments(memory) for motion in trials.cases[:5]]
-
-    def turned(by: Array) -> str:
-        return trials.same(lambda motion: motion.mapped(lambda v: by @ v), lambda velocity: by @ velocity)
-
     truths: TruthTable = {
-        "rule": ("the rule can be compiled", trials.compiles),
         "rotation": ("a motion turned about the vertical turns", lambda: turned(rotation_about_vertical(1.1))),
         "mirror": ("a motion seen in a mirror is mirrored", lambda: turned(MIRROR)),
         "rest": ("at rest, without a command, the velocity is finite", rest),
         "time step": ("halving dt shrinks the error", time_step),
-        "units": ("in other units of length and time it is the same", trials.units),
-        "single precision": ("the rule does not turn float32 into doubles", lambda: trials.single("b", givens)),
     }
-    return run_truths(f"body {part.name}", truths, part.violates)
+    return trials.report("body", truths)
 
 
 TRACKS, MEASUREMENTS = 8, 60  # random tracks that each truth is tried on, and how often each is measured
@@ -189,10 +228,8 @@ def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, se
     >>> airflock.check_sensor("gnss").broken
     ()
     """
-    part = find_part(SENSORS, sensor)
-    s = parameters_with_values(part.Parameters, parameters, "sensors")
+    part, s, rng = part_to_check(SENSORS, sensor, parameters, seed)
     period = s.period or 0.2
-    rng = np.random.default_rng(check_seed(seed))
     start = part.Memory() if part.Memory is not None else None
 
     def draw(number: int) -> Track:
@@ -209,14 +246,12 @@ def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, se
         made = np.empty_like(track.states)
         memory, off = start, State(*(0.0,) * 6)
         for k, state in enumerate(track.states):
-            drawn = draws(track.number, k)
+            drawn, period = draws(track.number, k), track.period
             if part.error is not None:
-                off = add_errors(part, s, off, [drawn[f"g{axis}"] for axis in range(3)], track.period)
+                off = add_errors(part, s, off, [drawn[f"g{axis}"] for axis in range(3)], period)
                 made[k] = state + np.array(off)
             else:
-                made[k], memory = call_measure(
-                    part, s, state.tolist(), memory, k * track.period, track.period, drawn
-                )  # fmt: skip
+                made[k], memory = call_measure(part, s, state.tolist(), memory, k * period, period, drawn)
         return made
 
     def scale(units: UnitScale, track: Track) -> tuple[Track, Array]:
@@ -236,36 +271,29 @@ def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, se
         track = trials.cases[0]
         return trials.first_mismatch([(measure(zero, track), track.states)]) if part.is_exact(zero) else ""
 
-    trials = Trials(
-        part.name, rules_of(part, ("measure", "error")), s, measure, [draw(k) for k in range(TRACKS)], seed, scale
-    )  # fmt: skip
-    shift = np.array([1234.0, -567.0, 89.0, 0.0, 0.0, 0.0])
+    rules, tracks = rules_of(part, ("measure", "error")), [draw(k) for k in range(TRACKS)]
     usual = dict(zip(COMPONENTS, (1.0, 2.0, 3.0, 0.5, 0.25, 0.125), strict=True)) | {"dx": 0.3, "dv": 0.1, "g": 0.4}
-    givens = [
-        {**usual, **draws(k, k), "memory": start, "time": k * period, "period": period} for k in range(5)
-    ]  # fmt: skip
+    usual |= {"memory": start, "period": period}
+    givens = [{**usual, **draws(k, k), "time": k * period} for k in range(5)]
+    trials = Trials(part, rules, "s", s, measure, tracks, seed, scale, givens)
+    shift = np.array([*SHIFT.values(), 0.0, 0.0, 0.0])
     truths: TruthTable = {
-        "rule": ("the rule can be compiled", trials.compiles),
         "place": (
             "shifting the track shifts the measurements",
             lambda: trials.same(lambda track: track._replace(states=track.states + shift), lambda made: made + shift),
         ),
         "bounded": ("errors stay finite", bounded),
         "exact": ("where `exact` holds, it measures the true state", exact),
-        "units": ("in other units of length and time it is the same", trials.units),
-        "single precision": ("the rule does not turn float32 into doubles", lambda: trials.single("s", givens)),
     }
-    return run_truths(f"sensor {part.name}", truths, part.violates)
+    return trials.report("sensor", truths)
 
 
 def state_scale(units: UnitScale) -> Array:
     """Return the factors by which a position (m) and a velocity (m/s) grow."""
-    return np.repeat([units.metre, units.metre / units.second], 3)
+    return np.array([unit_factor(unit, units) for unit in STATE_UNITS])
 
 
 PAIRS = 60  # random pairs that each truth is tried on
-LENGTHS, TIMES = ("distance", "dx", "dy", "dz", "ex", "ey", "ez", "x", "y", "z"), ("age", "since", "period")
-SPEEDS = ("vx", "vy", "vz", "evx", "evy", "evz")
 
 
 @standing_list(RADIOS)
@@ -283,36 +311,23 @@ def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed
     >>> airflock.check_radio("bursts").broken
     ()
     """
-    part = find_part(RADIOS, radio)
-    k = parameters_with_values(part.Parameters, parameters, "radio")
+    part, k, rng = part_to_check(RADIOS, radio, parameters, seed)
     rules = rules_of(part, RADIO_RULES)
-    rng = np.random.default_rng(check_seed(seed))
     names = sorted({name for kind in RADIO_RULES for name in VOCABULARY[kind]})
     packet = part.Packet() if part.Packet is not None else None
 
     def draw(number: int) -> dict[str, Any]:
         given: dict[str, Any] = {name: float(rng.uniform() if name[0] == "u" else rng.normal()) for name in names}
         offset, place = 30.0 * rng.normal(size=3), 50.0 * rng.normal(size=3)
-        given |= {f"d{a}": float(v) for a, v in zip(AXES, offset, strict=True)}
-        given |= {a: float(v) for a, v in zip(AXES, place, strict=True)}
-        given |= {"distance": math.hypot(*offset), "clear": float(number % 2), "talkers": float(rng.integers(1, 50))}
-        given |= {"step": float(number), "period": 0.2, "fast": int(rng.integers(0, 4)), "slow": number % 3}
+        given |= {**named("d", offset), **named("", place), "distance": math.hypot(*offset)}
+        given |= {"clear": float(number % 2), "talkers": float(rng.integers(1, 50)), "step": float(number)}
+        given |= {"period": 0.2, "fast": int(rng.integers(0, 4)), "slow": number % 3}
         return given | {"age": float(rng.uniform(0.0, 5.0)), "since": float(rng.uniform(0.1, 5.0)), "packet": packet}
 
-    def answer(k: Any, case: tuple[str, Mapping[str, Any]]) -> Array:
-        kind, given = case
-        made = call_rule(rules[kind], kind, {**given, "k": k}, part.name)
-        if kind == "receive" and packet is not None:
-            made = made[0]  # what it keeps has units of its own
-        return np.atleast_1d(np.array(made, float))
-
-    def scale(units: UnitScale, case: tuple[str, Mapping[str, Any]]) -> tuple[Any, Array]:
-        kind, given = case
-        by = dict.fromkeys(LENGTHS, units.metre) | dict.fromkeys(TIMES, units.second)
-        by |= dict.fromkeys(SPEEDS, units.metre / units.second)
-        state = state_scale(units)
-        sizes = {"late": np.array(units.second), "carry": state[:3], "see": state}.get(kind, np.array(1.0))
-        return (kind, {name: value * by[name] if name in by else value for name, value in given.items()}), sizes
+    def answer(k: Any, case: Case) -> Array:
+        made = call_rule(rules[case[0]], case[0], {**case[1], "k": k}, part.name)
+        # What `receive` keeps has units of its own.
+        return np.atleast_1d(np.array(made[0] if case[0] == "receive" and packet is not None else made, float))
 
     def chances() -> str:
         for kind, given in trials.cases:
@@ -328,27 +343,19 @@ def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed
         given = [{**given, "age": 0.0} for _, given in carried]
         return trials.first_mismatch((answer(k, ("carry", g)), np.array([g[a] for a in AXES])) for g in given)
 
-    pairs = [draw(number) for number in range(PAIRS)]
-    cases = [(kind, given) for given in pairs for kind in rules]
-    trials = Trials(part.name, rules, k, answer, cases, seed, scale, separate=True)
+    cases = [(kind, given) for given in map(draw, range(PAIRS)) for kind in rules]
+    trials = rule_trials(part, rules, "k", k, cases, seed, answer, separate=True)
     carried = [case for case in cases if case[0] == "carry"]
-    shift = np.array([1234.0, -567.0, 89.0])
-
-    def shifted(case: tuple[str, Mapping[str, Any]]) -> tuple[str, Mapping[str, Any]]:
-        return case[0], {**case[1], **{a: case[1][a] + by for a, by in zip(AXES, shift.tolist(), strict=True)}}
-
+    shift = np.array(list(SHIFT.values()))
     truths: TruthTable = {
-        "rule": ("every rule can be compiled", trials.compiles),
         "chances": ("chances lie between 0 and 1, delays are not negative", chances),
         "fresh": ("a packet of age 0 is believed as it is", fresh),
         "place": (
             "shifting the sender shifts where it is believed to be",
             lambda: trials.same(shifted, lambda there: there + shift, carried),
         ),
-        "units": ("in other units of length and time it is the same", trials.units),
-        "single precision": ("rules do not turn float32 into doubles", lambda: trials.single("k", pairs[:5])),
     }
-    return run_truths(f"radio {part.name}", truths, part.violates)
+    return trials.report("radio", truths)
 
 
 FLOCKS = 40  # random flocks that each truth is tried on
@@ -383,9 +390,7 @@ def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *
     >>> airflock.check_topology("nearest", {"k": 3}).broken
     ()
     """
-    part: Topology = find_part(TOPOLOGIES, topology)
-    t = parameters_with_values(part.Parameters or TopologyParameters, parameters, "topology")
-    rng = np.random.default_rng(check_seed(seed))
+    part, t, rng = part_to_check(TOPOLOGIES, topology, parameters, seed)
 
     def draw(number: int) -> Neighbours:
         """Others at random places or on a lattice, some of them not heard."""
@@ -428,13 +433,11 @@ def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *
         return far <= np.median(far)
 
     turn = rotation_about_vertical(0.7 + rng.uniform(0.0, 5.0))
-    cases = [draw(number) for number in range(FLOCKS)]
     trials = Trials(
-        part.name, {"meet": part.meet}, t, met, cases, seed,
+        part, {"meet": part.meet}, "t", t, met, [draw(number) for number in range(FLOCKS)], seed,
         lambda units, others: (others._replace(offsets=others.offsets * units.metre), np.array(1.0)),
     )  # fmt: skip
     truths: TruthTable = {
-        "rule": ("the rule can be compiled", trials.compiles),
         "heard": ("each agent is met or not, and none that is not heard", heard),
         "order": (
             "the order of the others does not matter",
@@ -445,13 +448,11 @@ def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *
             lambda: trials.same(lambda others: others._replace(offsets=others.offsets @ turn.T)),
         ),
         "near": ("where it says NEAR, nobody farther matters", lambda: compare(inner) if part.near else ""),
-        "units": ("in another unit of length it is the same", trials.units),
     }
-    return run_truths(f"topology {part.name}", truths, part.violates)
+    return trials.report("topology", truths)
 
 
 CASES = 40  # random states that each truth is tried on
-FAULT_UNITS = {"x": "m", "y": "m", "z": "m", "reach": "m", "since": "s", "dt": "s"}  # of arguments; others: m/s
 
 
 @standing_list(FAULTS)
@@ -469,27 +470,16 @@ def check_fault(fault: Any, parameters: Mapping[str, Any] | None = None, *, seed
     >>> airflock.check_fault("motor").broken
     ()
     """
-    part = find_part(FAULTS, fault)
-    f = parameters_with_values(part.Parameters, parameters, "fault")
-    rng = np.random.default_rng(check_seed(seed))
-    names = {name for kind in part.rules for name in VOCABULARY[kind]} - {"f"}
-    # A command is that of the law; a velocity stands for all.
-    units = {name: FAULT_UNITS.get(name.removeprefix("at_"), "m/s") for name in sorted(names)}
-    answers = {"radio": ["m"] * 2, "clock": ["s"], "leaves": ["s"], "overrule": ["m/s"] * 3, "motion": ["m/s"] * 3}
-    shift = dict(zip(AXES, (1234.0, -567.0, 89.0), strict=True))
+    part, f, rng = part_to_check(FAULTS, fault, parameters, seed)
+    names = sorted({name for kind in part.rules for name in VOCABULARY[kind]} - {"f"})
 
     def draw() -> dict[str, Any]:
-        given = {name: float(rng.normal(0.0, 5.0)) for name in units}
+        given = {name: float(rng.normal(0.0, 5.0)) for name in names}
         return given | {"since": float(rng.uniform(0.0, 100.0)), "reach": float(rng.uniform(1.0, 100.0)), "dt": 0.02}
 
-    def answer(f: Any, case: tuple[str, Mapping[str, Any]]) -> Array:
+    def answer(f: Any, case: Case) -> Array:
         made = np.atleast_1d(np.array(call_rule(part.rules[case[0]], case[0], {**case[1], "f": f}, part.name), float))
         return np.maximum(made, 0.0) if case[0] == "radio" else made  # a negative range means none at all
-
-    def scale(to: UnitScale, case: tuple[str, Mapping[str, Any]]) -> tuple[Any, Array]:
-        by = answers.get(case[0], ["m"] * 3 + ["m/s"] * 3)
-        scaled = {name: value * unit_factor(units[name], to) for name, value in case[1].items() if name in units}
-        return (case[0], scaled), np.array([unit_factor(unit, to) for unit in by])
 
     def finite() -> str:
         for kind, given in trials.cases:
@@ -498,26 +488,19 @@ def check_fault(fault: Any, parameters: Mapping[str, Any] | None = None, *, seed
                 return f"seed {seed}: {kind} gives ({numbers_text(made)}) instead of {count} finite numbers"
         return ""
 
-    def shifted(case: tuple[str, Mapping[str, Any]]) -> tuple[str, Mapping[str, Any]]:
-        by = {name: shift[name[-1]] for name in case[1] if name in ("x", "y", "z", "at_x", "at_y", "at_z")}
-        return case[0], {**case[1], **{name: case[1][name] + step for name, step in by.items()}}
-
     givens = [draw() for _ in range(CASES)]
     cases = [(kind, given) for given in givens for kind in part.rules]
-    moved = np.array([*shift.values(), 0.0, 0.0, 0.0])
+    moved = np.array([*SHIFT.values(), 0.0, 0.0, 0.0])
     placed = [case for case in cases if case[0] in ("sense", "tell")]
-    trials = Trials(part.name, part.rules, f, answer, cases, seed, scale, separate=True)
+    trials = rule_trials(part, part.rules, "f", f, cases, seed, answer, separate=True)
     truths: TruthTable = {
-        "rule": ("every rule can be compiled", trials.compiles),
         "answers": ("each rule returns the numbers that its stage needs", finite),
         "place": (
             "shifting the flight shifts what is believed",
             lambda: trials.same(shifted, lambda state: state + moved, placed),
         ),
-        "units": ("in other units of length and time it is the same", trials.units),
-        "single precision": ("rules do not turn float32 into doubles", lambda: trials.single("f", givens[:5])),
     }
-    return run_truths(f"fault {part.name}", truths, part.violates)
+    return trials.report("fault", truths)
 
 
 AGENTS, INSTANTS, TRIED = 6, 5, 8
@@ -569,6 +552,8 @@ def check_metric(part: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     ()
     """
     metrics: MetricSet = find_part(SETS, part)
+    of_metrics = {key: why for metric in metrics.metrics for key, why in metric.violates.items()}
+    metrics = replace(metrics, violates=of_metrics | dict(metrics.violates))
     scenario = _measured_scenario(metrics, dimensions)
     rng = np.random.default_rng(check_seed(seed))
     flat = np.array([1.0, 1.0, float(dimensions == 3)])
@@ -609,8 +594,8 @@ def check_metric(part: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
         for kind, rule in rules_of(metric, METRIC_RULES).items()
     }
     trials = Trials(
-        metrics.name, rules, q, lambda q, case: np.array([measure(q, case)[name] for name in names]), cases, seed,
-        scale, floor=1e-3, separate=True,
+        metrics, rules, "q", q, lambda q, case: np.array([measure(q, case)[name] for name in names]), cases, seed,
+        scale, floor=1e-3, close=CLOSE_IN_OTHER_UNITS, separate=True,
     )  # fmt: skip
     turn = rotation_about_vertical(rng.uniform(0.5, 2.5))
     order = rng.permutation(AGENTS)
@@ -623,7 +608,6 @@ def check_metric(part: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
         return same(lambda states: np.concatenate([states[:, :, :3] @ by.T, states[:, :, 3:] @ by.T], axis=2))
 
     truths: TruthTable = {
-        "rules": ("every rule can be compiled", trials.compiles),
         "reports": ("every value has a unit and a meaning", reports),
         "rotation": ("turning the flock about the vertical does not change the values", turned(turn)),
         "translation": ("shifting the flock does not change the values", same(lambda states: states + shift)),
@@ -631,13 +615,9 @@ def check_metric(part: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
         "renumbering": ("renumbering the agents does not change the values", same(lambda states: states[:, order])),
         "lone agent": ("a single agent gives finite values", lambda: finite([0])),
         "two agents": ("two agents at one place give finite values", lambda: finite([0, 0])),
-        "units": (
-            "in other units of length and time each value scales by its unit",
-            lambda: trials.units(CLOSE_IN_OTHER_UNITS),
-        ),
+        "units": ("in other units of length and time each value scales by its unit", trials.units),
     }
-    violates = {key: why for metric in metrics.metrics for key, why in metric.violates.items()}
-    return run_truths(f"metrics {metrics.name}", truths, violates | dict(metrics.violates))
+    return trials.report("metrics", truths)
 
 
 def _measured_scenario(metrics: MetricSet, dimensions: int) -> Scenario:

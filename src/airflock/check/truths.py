@@ -5,7 +5,7 @@ import math
 import re
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypeVar
 
@@ -115,29 +115,6 @@ def standing_list(kind: Kind[Any]) -> Callable[[Check], Check]:
     return add
 
 
-def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Report:
-    """Run all truths and report them; raises CheckError where one breaks that is not declared.
-
-    violates : name → why a truth does not hold here. One that no list knows is an error, so that none is misspelled.
-    """
-    unknown = sorted(set(violates) - set(truths))
-    if unknown:
-        raise RuleError(f"{name}: VIOLATES names {', '.join(unknown)}; known: {', '.join(truths)}")
-    made = []
-    for key, (says, check) in truths.items():
-        try:
-            mismatch = check()
-        except RuleError as error:
-            mismatch = str(error).splitlines()[0]
-        except (ArithmeticError, ValueError) as error:  # of the rule itself: a division by zero, a root of -1
-            mismatch = f"{type(error).__name__}: {error}"
-        made.append(Truth(key, says, mismatch, violates.get(key, "")))
-    report = Report(name, tuple(made))
-    if any(truth.is_broken for truth in made):
-        raise CheckError("\n".join(f"{name}: {truth}" for truth in made if truth.is_broken))
-    return report
-
-
 def parameters_with_values(record: type, values: Any, section: str) -> Any:
     """A record of parameters with the values that a caller gives by name; the others keep their defaults."""
     errors = ErrorCollector()
@@ -212,24 +189,45 @@ def rescaled_scenario(scenario: Scenario, units: UnitScale) -> Scenario:
 class Trials:
     """A part with its numbers, tried on random cases: what must hold of each answer.
 
-    rules   : its rules by kind; owner: its name, for errors
-    numbers : record of its parameters
+    part    : with its name and the truths that it VIOLATES
+    rules   : its rules by kind; letter : by which they read the numbers; numbers : record of its parameters
     answer  : numbers and a case → what the part makes of it, in SI units
     cases   : random cases; seed : of these
     scale   : a unit scale and a case → the case in other units, and the factors by which its answer grows
-    floor   : size below which a difference of answers counts as one of this size
+    givens  : arguments of rules by name, on which they are tried in single precision
+    constants : choices by record name, as a plan has them, beside its own
+    floor   : size below which a difference of answers counts as one of this size; close : what is equal in other units
     separate : True if each number of an answer has a size of its own
     """
 
-    owner: str
+    part: Any
     rules: Mapping[str, Callable[..., Any]]
+    letter: str
     numbers: Any
     answer: Callable[[Any, Any], Array]
     cases: Sequence[Any]
     seed: int
     scale: Callable[["UnitScale", Any], tuple[Any, Any]]
+    givens: Iterable[Mapping[str, Any]] = ()
+    constants: Mapping[str, Any] = field(default_factory=dict)
     floor: float = 1.0
+    close: float = CLOSE
     separate: bool = False
+
+    def report(self, noun: str, truths: TruthTable) -> Report:
+        """Run the truths of a kind and those of all kinds; raises CheckError where one breaks that is not declared."""
+        table = {**truths, "rule": ("every rule can be compiled", self.compiles)}
+        table.setdefault("units", ("in other units of length and time it is the same", self.units))
+        if self.givens:
+            table["single precision"] = ("no rule turns float32 into doubles", self.single)
+        name, violates = f"{noun} {self.part.name}", self.part.violates
+        # A name that no list knows is an error, so that none is misspelt.
+        if unknown := sorted(set(violates) - set(table)):
+            raise RuleError(f"{name}: VIOLATES names {', '.join(unknown)}; known: {', '.join(table)}")
+        made = tuple(Truth(key, says, _mismatch(check), violates.get(key, "")) for key, (says, check) in table.items())
+        if broken := [f"{name}: {truth}" for truth in made if truth.is_broken]:
+            raise CheckError("\n".join(broken))
+        return Report(name, made)
 
     def compiles(self) -> str:
         """Return why a rule cannot be compiled."""
@@ -246,13 +244,13 @@ class Trials:
         pairs = ((self.answer(self.numbers, change(c)), back(self.answer(self.numbers, c))) for c in cases)
         return self.first_mismatch(pairs)
 
-    def units(self, close: float = CLOSE) -> str:
+    def units(self) -> str:
         """Return where the part answers otherwise in other units of length and time."""
         for units in UNIT_SCALES:
             other = rescaled(self.numbers, units)
             scaled = ((case, *self.scale(units, case)) for case in self.cases)
             pairs = ((self.answer(other, new) / by, self.answer(self.numbers, case)) for case, new, by in scaled)
-            if mismatch := self.first_mismatch(pairs, close):
+            if mismatch := self.first_mismatch(pairs, self.close):
                 return f"{mismatch}: {HIDDEN}"
         return ""
 
@@ -267,17 +265,24 @@ class Trials:
                 return f"case {number} of seed {self.seed}: off by {apart.max():.2g}, ({off}) instead of ({was})"
         return ""
 
-    def single(self, letter: str, arguments: Iterable[Mapping[str, Any]]) -> str:
-        """Return nothing if all rules stay in single precision; raise RuleError where one does not.
-
-        letter : by which rules read the part's numbers; arguments: of rules, by name
-        """
-        for given in arguments:
+    def single(self) -> str:
+        """Return nothing if all rules stay in single precision; raise RuleError where one does not."""
+        constants = {self.letter: choices(self.numbers), **self.constants}
+        for given in self.givens:
             for kind, rule in self.rules.items():
-                constants = {letter: choices(self.numbers)}
-                names = argument_names(rule, kind, self.owner)
-                run_in_single_precision(rule, constants, {**given, letter: self.numbers}, names)
+                names = argument_names(rule, kind, self.part.name)
+                run_in_single_precision(rule, constants, {**given, self.letter: self.numbers}, names)
         return ""
+
+
+def _mismatch(check: Callable[[], str]) -> str:
+    """Return what a check finds against a truth, also where the rule fails."""
+    try:
+        return check()
+    except RuleError as error:
+        return str(error).splitlines()[0]
+    except (ArithmeticError, ValueError) as error:  # of the rule itself: a division by zero, a root of -1
+        return f"{type(error).__name__}: {error}"
 
 
 def numbers_text(values: Array) -> str:
