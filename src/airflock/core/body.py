@@ -10,6 +10,7 @@ from airflock.core.contract import (
     argument_names,
     call_rule,
     check_memory_record,
+    gather,
     initial_values,
     merge_parameters,
     namespace_names,
@@ -167,15 +168,12 @@ def body(namespace: Any, name: str = "") -> Body:
     arguments = argument_names(found["move"], "move", name)
     if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
         raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
-    memory = found.get("Memory")
-    check_memory_record(f"body {name}", "move", arguments, memory)
+    check_memory_record(f"body {name}", "move", arguments, found.get("Memory"))
     for optional in ("limits", "endures"):
         if found.get(optional) is not None:
             argument_names(found[optional], optional, name)
     parameters = merge_parameters(BodyParameters, found.get("Parameters"), f"body {name}")
     if not issubclass(parameters, BodyParameters):
         raise RuleError(f"body {name}: delay is the dead time before every body; call its own number otherwise")
-    return Body(
-        name, parameters, found["ACCEPTS"], found["INTEGRATION"], found["move"],
-        dict(found.get("VIOLATES", {})), memory, found.get("limits"), found.get("endures"),
-    )  # fmt: skip
+    how = {"accepts": found["ACCEPTS"], "integration": found["INTEGRATION"]}
+    return gather(Body, found, name=name, Parameters=parameters, **how)

@@ -9,7 +9,7 @@ import inspect
 import sys
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field, make_dataclass, replace
+from dataclasses import MISSING, dataclass, field, fields, make_dataclass, replace
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
@@ -178,6 +178,21 @@ def _left_out(where: str, error: Exception) -> str:
     line = f"{where}: {shortened(text)}; it is left out"
     warnings.warn(line, stacklevel=2)
     return line
+
+
+def gather(member: Callable[..., Part], found: Mapping[str, Any], **given: Any) -> Part:
+    """Make a member of a kind from names: what is not given stands in the name of its field, values in capitals.
+
+    A rule or a record (a field without a default, or None by default) has the name of its field: `neighbour`, `Sums`.
+    A value has that name in capitals: VIOLATES, RATES.
+    """
+    values = dict(given)
+    for item in fields(member):  # type: ignore[arg-type]
+        is_rule = item.default in (None, MISSING) and item.default_factory is MISSING
+        key = item.name if is_rule else item.name.upper()
+        if item.name not in given and key in found:
+            values[item.name] = dict(found[key]) if item.default_factory is dict else found[key]
+    return member(**values)
 
 
 def merge_parameters(common: type, record: Any, owner: str) -> type:

@@ -13,7 +13,7 @@ from math import inf
 from typing import Any
 
 from airflock.core.body import COMMAND, MOTION, STATE
-from airflock.core.contract import argument_names, call_rule, namespace_names
+from airflock.core.contract import argument_names, call_rule, gather, namespace_names
 from airflock.core.parameters import Parameters, choices, number_names
 from airflock.support import RuleError
 
@@ -172,7 +172,10 @@ def fault(namespace: Any, name: str = "") -> Fault:
     taken = [key for key in number_names(record) if key in ENTRY_KEYS]
     if taken:
         raise RuleError(f"fault {name}: Parameters.{taken[0]}: the name has a meaning of its own in [[faults]]")
-    made = Fault(name, record, doc=str(found.get("__doc__") or ""), violates=dict(found.get("VIOLATES", {})), **rules)
+    made = gather(
+        Fault, found, name=name, Parameters=record, doc=str(found.get("__doc__") or ""),
+        **{kind: rules.get(kind) for kind in FAULT_RULES},
+    )  # fmt: skip
     # A driver keeps the onset and the disturbed states of an agent in columns of these names.
     kept = [
         key

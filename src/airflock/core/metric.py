@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.body import STATE
-from airflock.core.contract import CLOCKS, OVER_TIME, REDUCTIONS, argument_names, call_rule, namespace_names
+from airflock.core.contract import CLOCKS, OVER_TIME, REDUCTIONS, argument_names, call_rule, gather, namespace_names
 from airflock.core.model import FLOCK, PAIR
 from airflock.support import RuleError
 
@@ -215,25 +215,9 @@ def metric(namespace: Any, name: str = "") -> Metric:
     for key, how in found.get("OVER_TIME", {}).items():
         if key not in found["Sample"]._fields or how not in OVER_TIME:
             raise RuleError(f"metric {name}: OVER_TIME[{key!r}] = {how!r}; give a field of Sample, one of {OVER_TIME}")
-    clock = found.get("CLOCK", "sample")
-    if clock not in CLOCKS:
-        raise RuleError(f"metric {name}: CLOCK = {clock!r}; give one of {CLOCKS}")
-    records = (
-        "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
-        "Memory", "within", "settled", "linked_within", "total", "survey", "Shared", "workspace", "Parameters",
-    )  # fmt: skip
-    return Metric(
-        name=name,
-        reduce=dict(found.get("REDUCE", {})),
-        over_time=dict(found.get("OVER_TIME", {})),
-        reports=dict(found.get("REPORTS", {})),
-        violates=dict(found.get("VIOLATES", {})),
-        courses=dict(found.get("COURSES", {})),
-        formulas=dict(found.get("FORMULAS", {})),
-        needs=dict(found.get("NEEDS", {})),
-        clock=clock,
-        **{key: found[key] for key in records if key in found},
-    )
+    if found.get("CLOCK", "sample") not in CLOCKS:
+        raise RuleError(f"metric {name}: CLOCK = {found['CLOCK']!r}; give one of {CLOCKS}")
+    return gather(Metric, found, name=name)
 
 
 @dataclass(frozen=True)

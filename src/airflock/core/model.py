@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from inspect import signature
 from typing import Any
 
-from airflock.core.contract import COMMANDS, REDUCTIONS, argument_names, namespace_names
+from airflock.core.contract import COMMANDS, REDUCTIONS, argument_names, gather, namespace_names
 from airflock.core.parameters import declarations
 from airflock.support import RuleError
 
@@ -207,34 +207,19 @@ def model(namespace: Any, name: str = "") -> Model:
     for kind in RULES:
         if kind in found and kind != "steer":
             argument_names(found[kind], kind, name)
-    reduce = dict(found.get("REDUCE", {}))
-    for key, how in reduce.items():
+    for key, how in found.get("REDUCE", {}).items():
         if key not in getattr(found.get("Sums"), "_fields", ()) or how not in REDUCTIONS:
             raise RuleError(f"model {name}: REDUCE[{key!r}] = {how!r}; give a field of Sums and one of {REDUCTIONS}")
-    return Model(
+    return gather(
+        Model,
+        found,
         name=name,
-        Parameters=found["Parameters"],
         command=found["COMMAND"],
-        decide=found["decide"],
-        reach=found.get("reach"),
-        sight=found.get("sight"),
-        neighbour=found.get("neighbour"),
-        Sums=found.get("Sums"),
-        boundary=found.get("boundary"),
-        Walls=found.get("Walls"),
-        wall_reach=found.get("wall_reach"),
-        Memory=found.get("Memory"),
-        flock=found.get("flock"),
-        Shared=found.get("Shared"),
-        workspace=found.get("workspace"),
-        reduce=reduce,
-        usual=dict(found.get("USUAL", {})),
-        preferred_speed=found.get("preferred_speed"),
-        interaction_range=found.get("interaction_range"),
         doc=str(found.get("__doc__") or ""),
-        violates=dict(found.get("VIOLATES", {})),
         terms=_terms(found.get("TERMS", {}), found.get("Sums"), name),
         parts=_parts(found.get("PARTS", {}), found["Parameters"], name),
+        added=None,  # made of laws, not read of one
+        steer=None,
     )
 
 

@@ -16,6 +16,7 @@ from airflock.core.contract import (
     argument_names,
     call_rule,
     check_memory_record,
+    gather,
     initial_values,
     merge_parameters,
     namespace_names,
@@ -244,8 +245,7 @@ def radio(namespace: Any, name: str = "") -> Radio:
         raise RuleError(f"radio {name} has see and late; give one of them, as pictures all have the delay of the radio")
     if set(rules) <= {"carry", "lasts", "missed_few"}:
         raise RuleError(f"radio {name} has only {' and '.join(rules)}; give missed, receive, late or see as well")
-    packet = found.get("Packet")
-    check_memory_record(f"radio {name}", "receive", arguments.get("receive", ()), packet, "Packet")
+    check_memory_record(f"radio {name}", "receive", arguments.get("receive", ()), found.get("Packet"), "Packet")
     record = merge_parameters(PacketParameters, found.get("Parameters"), f"radio {name}")
     rates = tuple(found.get("RATES", ()))
     unknown = [rate for rate in rates if rate not in number_names(record)]
@@ -254,7 +254,8 @@ def radio(namespace: Any, name: str = "") -> Radio:
     wanted = set(arguments.get("missed", ())) & set(LINK_NAMES) - set(LINK_NAMES[: len(rates)])
     if wanted:
         raise RuleError(f"radio {name}: missed asks for {sorted(wanted)[0]}, which RATES does not name")
-    return Radio(name, record, Packet=packet, rates=rates, violates=dict(found.get("VIOLATES", {})), **rules)
+    how = {kind: rules.get(kind) for kind in RULES}
+    return gather(Radio, found, name=name, Parameters=record, rates=rates, **how)
 
 
 FIRST = {  # before anything is known

@@ -15,6 +15,7 @@ from airflock.core.contract import (
     argument_names,
     call_rule,
     check_memory_record,
+    gather,
     initial_values,
     merge_parameters,
     namespace_names,
@@ -147,16 +148,13 @@ def sensor(namespace: Any, name: str = "") -> Sensor:
     rules = [kind for kind in ("measure", "error") if callable(found.get(kind))]
     if len(rules) != 1:
         raise RuleError(f"sensor {name} has {' and '.join(rules) or 'no rule'}; give measure, or error")
-    memory = found.get("Memory")
-    check_memory_record(f"sensor {name}", "measure", argument_names(found[rules[0]], rules[0], name), memory)
+    arguments = argument_names(found[rules[0]], rules[0], name)
+    check_memory_record(f"sensor {name}", "measure", arguments, found.get("Memory"))
     for kind in ("exact", "bounds"):
         if found.get(kind) is not None:
             argument_names(found[kind], kind, name)
     parameters = merge_parameters(SensorParameters, found.get("Parameters"), f"sensor {name}")
-    return Sensor(
-        name, parameters, found.get("measure"), found.get("error"), memory,
-        found.get("exact"), found.get("bounds"), dict(found.get("VIOLATES", {})),
-    )  # fmt: skip
+    return gather(Sensor, found, name=name, Parameters=parameters)
 
 
 Words = Callable[[int, int], tuple[int, int, int, int]]

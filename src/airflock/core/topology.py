@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.core.contract import argument_names, namespace_names
+from airflock.core.contract import argument_names, gather, namespace_names
 from airflock.core.parameters import Choice, Parameters, declarations
 from airflock.support import RuleError
 
@@ -76,5 +76,4 @@ def topology(namespace: Any, name: str = "") -> Topology:
     words = [word for word, declared, _ in declarations(record) if isinstance(declared, Choice)]
     if words:
         raise RuleError(f"topology {name}: Parameters.{words[0]} is a choice; a topology has numbers only")
-    near, flat = bool(found.get("NEAR", False)), bool(found.get("FLAT", False))
-    return Topology(name, rule, flat, near, record, dict(found.get("VIOLATES", {})))
+    return gather(Topology, found, name=name, Parameters=record)
