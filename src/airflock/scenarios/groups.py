@@ -180,7 +180,7 @@ def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: i
     apart = {agent for members in by_law.values() for group in members for agent in group.agents}
     rest = _without(agents, apart)
     base = [group for group in groups if group.law is None]
-    laws = [FlownLaw(model, parameters, rest, _varied(base, parameters))]
+    laws = [FlownLaw(model, parameters, rest, varied_numbers(base, {"p": parameters}))]
     for (law, _), members in by_law.items():
         first = members[0]
         assert first.law is not None
@@ -189,28 +189,13 @@ def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: i
             first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"}
         )
         who = tuple(sorted(agent for group in members for agent in group.agents))
-        laws.append(FlownLaw(law, record, who, _varied(members, record)))
+        laws.append(FlownLaw(law, record, who, varied_numbers(members, {"p": record})))
     return tuple(laws)
 
 
 def _without(agents: int, taken: Collection[int]) -> Sequence[int]:
     """Return the numbers of agents that are not taken; a range where all are left, as a list of them may be large."""
     return tuple(agent for agent in range(agents) if agent not in taken) if taken else range(agents)
-
-
-def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]:
-    """Return the numbers of a law that differ among groups, as ("p", name), in declared order."""
-    names = []
-    for name, declared, _ in declarations(record):
-        usual, key = float(getattr(record, name) or 0.0) if isinstance(declared, Quantity) else 0.0, ("p", name)
-        values = {
-            group.numbers.get(key, float(getattr(group.law[1] if group.law else record, name) or 0.0))
-            for group in groups
-            if isinstance(declared, Quantity)
-        }
-        if values - {usual} or any(group.spread.get(key, 0.0) > 0.0 for group in groups):
-            names.append(key)
-    return tuple(names)
 
 
 def read_members(where: str, value: Any, agents: int, errors: ErrorCollector) -> Sequence[int]:
@@ -349,16 +334,17 @@ def _read_numbers(of: str, section: str, table: Any, record: type, group: Group,
 def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return the numbers that differ among agents, as (letter, name), in declared order.
 
-    base : letter → record of the flock. Varied numbers of laws: `FlownLaw.varied`.
+    base : letter → record of those that are in no group; a group with a law of its own has the numbers of that
     """
     names = []
     for letter, record in base.items() if groups else ():
         for name, declared, _ in declarations(record):
             if isinstance(declared, Quantity):
-                usual = float(getattr(record, name) or 0.0)
-                others = any(group.numbers.get((letter, name), usual) != usual for group in groups)
-                if others or any(group.spread.get((letter, name), 0.0) > 0.0 for group in groups):
-                    names.append((letter, name))
+                key, usual = (letter, name), float(getattr(record, name) or 0.0)
+                records = ((g, g.law[1] if g.law and letter == "p" else record) for g in groups)
+                own = (group.numbers.get(key, getattr(of, name) or 0.0) for group, of in records)
+                if any(value != usual for value in own) or any(group.spread.get(key, 0.0) > 0.0 for group in groups):
+                    names.append(key)
     return tuple(names)
 
 

@@ -29,7 +29,7 @@ from airflock.core import (
 from airflock.parts import SENSORS, TOPOLOGIES, steering
 from airflock.parts.aero import descent, wing as wings
 from airflock.parts.bodies import wind
-from airflock.parts.metrics import Parameters as MetricParameters, parameters as metric_parameters
+from airflock.parts.metrics import parameters as metric_parameters
 from airflock.scenarios.fault_entries import FaultEntry
 from airflock.scenarios.groups import FlownLaw, Group, agent_values, flown_laws, varied_numbers
 from airflock.scenarios.scenario_checks import largest_extension
@@ -323,7 +323,21 @@ class Scenario:
     @cached_property
     def _measured(self) -> metric_parameters.Parameters:
         """Metric parameters without open ones."""
-        return default_metrics(self)
+        given, p, model = self.metrics.numbers, self.parameters, self.model
+        open_numbers = {name for name, value in vars(given).items() if value is None}
+        speed = (self.steer.speed or 1.0) if model.preferred_speed is None else model.speed(p)
+        speed = speed if given.v_flock is None else given.v_flock
+        # Two agents are of one cluster if they interact; a law without a finite range leaves the
+        # radio's.
+        known = model.interaction_range or model.reach
+        # The largest extension is the largest number where nothing bounds it; then `unmeasured`.
+        extension = given.max_e if given.max_e is not None else largest_extension(self.world) or 1e7
+        derived = {
+            "v_flock": speed, "v_tol": 0.375 * speed, "r_comm": self.radio.range,
+            "r_cluster": min(float(known(p)) if known else self.radio.range, 1e6),
+            "collision_period": self.flight.dt, "max_e": extension, "k": extension,
+        }  # fmt: skip
+        return replace(given, **{name: value for name, value in derived.items() if name in open_numbers})
 
     def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Add the fitness of the metric set and its parts to the order parameters of a flight."""
@@ -348,14 +362,14 @@ class Scenario:
         turn = steering.NO_LIMIT if self.steer.turn is None else self.steer.turn
         return replace(self.steer, speed=speed, turn=turn, response=self.steer.response or response)
 
-    def resolved_silence(self) -> SilenceParameters:
-        """Return the rule of silence, open numbers derived from the rest of the scenario."""
-        return self._silent
-
     @cached_property
     def _silent(self) -> SilenceParameters:
         """The rule of silence without open numbers."""
-        return default_silence(self)
+        return with_defaults(self.silence, self.model.speed(self.parameters), self.radio.delay)
+
+    def resolved_silence(self) -> SilenceParameters:
+        """Return the rule of silence, open numbers derived from the rest of the scenario."""
+        return self._silent
 
     def separation(self) -> float:
         """Return the smallest distance of two agents at the start, m.
@@ -425,35 +439,6 @@ def scenario_html(scenario: Scenario) -> str:
     notes = "".join(f"<li>{escape(note)}</li>" for note in scenario.notes)
     keys = html_table(("changed key", "value", "meaning"), rows)
     return f"<p><b>{escape(summary(scenario))}</b></p>{keys}{f'<ul>{notes}</ul>' if notes else ''}"
-
-
-def default_metrics(scenario: Scenario) -> MetricParameters:
-    """Return the numbers of the order parameters, with open ones derived from the scenario."""
-    numbers = dict(vars(scenario.metrics.numbers))
-    p, model = scenario.parameters, scenario.model
-    if numbers["v_flock"] is None:
-        numbers["v_flock"] = (scenario.steer.speed or 1.0) if model.preferred_speed is None else model.speed(p)
-    if numbers["v_tol"] is None:
-        numbers["v_tol"] = 0.375 * numbers["v_flock"]
-    if numbers["r_comm"] is None:
-        numbers["r_comm"] = scenario.radio.range
-    # Two agents are of one cluster if they interact; a law without a finite range leaves the
-    # radio's.
-    if numbers["r_cluster"] is None:
-        known = model.interaction_range or model.reach
-        numbers["r_cluster"] = min(float(known(p)), 1e6) if known else min(scenario.radio.range, 1e6)
-    if numbers["collision_period"] is None:
-        numbers["collision_period"] = scenario.flight.dt
-    if numbers["max_e"] is None:
-        numbers["max_e"] = largest_extension(scenario.world) or 1e7  # m, the largest; then `unmeasured`
-    if numbers["k"] is None:
-        numbers["k"] = numbers["max_e"]
-    return type(scenario.metrics.numbers)(**numbers)
-
-
-def default_silence(scenario: Scenario) -> SilenceParameters:
-    """Return the rule of silence, with open numbers derived from the scenario."""
-    return with_defaults(scenario.silence, scenario.model.speed(scenario.parameters), scenario.radio.delay)
 
 
 def default_separation(model: Model, parameters: Any, start_record: start.Parameters, world: arena.Parameters) -> float:

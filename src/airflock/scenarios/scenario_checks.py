@@ -7,8 +7,10 @@ checks that need it are left out.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
 from shapely import get_coordinates, union_all
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 from shapely.validation import explain_validity
@@ -230,6 +232,7 @@ def polygon_error(corners: Any) -> str:
     return "" if shape.area > 0.0 else "has no area"
 
 
+@lru_cache(maxsize=64)
 def largest_extension(world: arena.Parameters) -> float:
     """Return half the largest distance of two points of the arena, m; 0 without one.
 
@@ -247,33 +250,11 @@ def largest_extension(world: arena.Parameters) -> float:
 
 
 def diameter(points: Sequence[tuple[float, float]]) -> float:
-    """Return the largest distance between two of the points, m.
-
-    Rotating calipers turn around the convex hull: the farthest corner only moves on, so the walk is
-    linear.
-    """
-    hull = MultiPoint(points).convex_hull
-    if hull.is_empty or isinstance(hull, Point):
-        return 0.0
-    ends: list[tuple[float, ...]] = [*hull.exterior.coords][:-1] if isinstance(hull, Polygon) else [*hull.coords]
-    count, far, largest = len(ends), 1, 0.0
-    # For each side the farthest corner only moves forward, so all sides together need one turn
-    # around the hull.
-    for k, (x, y) in enumerate(ends):
-        nx, ny = ends[(k + 1) % count]
-
-        def beyond(i: int, x: float = x, y: float = y, nx: float = nx, ny: float = ny) -> float:
-            """Return twice the area of point i and the side, which grows with the distance of the point."""
-            return abs((nx - x) * (ends[i][1] - y) - (ny - y) * (ends[i][0] - x))
-
-        for _ in range(count):
-            after = (far + 1) % count
-            largest = max(largest, math.dist((x, y), ends[far]), math.dist((nx, ny), ends[far]))
-            # On a tie go on: of two parallel sides both far corners count.
-            if beyond(after) < beyond(far) or after == k:
-                break
-            far = after
-    return largest
+    """Return the largest distance between two of the points, m."""
+    # Both ends are corners of the convex hull; a field has few of them.
+    ends = get_coordinates(MultiPoint(points).convex_hull)
+    farthest = (ends[np.argmax(np.hypot(*(ends - end).T))] for end in ends)
+    return max((math.dist(end, other) for end, other in zip(ends, farthest, strict=True)), default=0.0)
 
 
 def formation_errors(world: arena.Parameters, start_record: start.Parameters, agents: int) -> list[str]:
