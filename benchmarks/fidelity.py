@@ -20,6 +20,7 @@ from airflock.runs.folder import read_request
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.search.study_space import read_space
+from airflock.support import ErrorCollector
 
 PARTS = {"early": (2, 4, 6, 8, 10, 12), "late": (40, 46, 52, 58, 64, 70)}  # generations, five candidates of each
 EACH, TRUTH, FLIGHTS, FIRST = 5, 16, 6, 3_300_000_000
@@ -53,7 +54,7 @@ def main():
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
     scenario = build_scenario(read_request(folder, "study")["scenario"], str(folder))
-    space, _ = read_space(read_request(folder, "study")["space"], scenario)
+    space = read_space(read_request(folder, "study")["space"], scenario, ErrorCollector())
     print("| part of the search | flights | ms | one flight and truth | means and truth | mean fitness |")
     print("|---|---|---|---|---|---|")
     for part, numbers in PARTS.items():

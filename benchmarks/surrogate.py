@@ -25,6 +25,7 @@ from airflock.runs.search_space import with_parameters
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.optimisers import CMAES
 from airflock.search.study_space import read_space
+from airflock.support import ErrorCollector
 
 TOLD = (2, 5, 10, 20, 30, 40, 50, 60, 71)  # generations
 FIRST = 3_200_000_000  # seeds of fresh flights
@@ -127,7 +128,7 @@ def halves(losses):
 def flown(folder, points, flights):
     """Mean loss of fresh flights of candidates at these points."""
     scenario = build_scenario(read_request(folder, "study")["scenario"], str(folder))
-    space, _ = read_space(read_request(folder, "study")["space"], scenario)
+    space = read_space(read_request(folder, "study")["space"], scenario, ErrorCollector())
     candidates = [with_parameters(scenario, space.parameters(point)) for point in points]
     seeds = [FIRST + i for i in range(flights)]
     rows = score_flights([s for s in candidates for _ in seeds], seeds * len(candidates), threads=1)

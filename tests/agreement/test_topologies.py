@@ -16,7 +16,7 @@ from airflock.engine import plan_of
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.study_space import read_space
-from airflock.support.errors import CardError, ScenarioError
+from airflock.support.errors import CardError, ErrorCollector, ScenarioError
 from fleets import document, scenario
 from flocks import ISLANDS, interpreted
 from inside import cpu, no_cuda, tables
@@ -181,14 +181,13 @@ def test_what_cannot_be_is_refused_at_once():
 
 def test_numbers_of_neighbours_are_searched_as_whole_numbers():
     found = airflock.load("vasarhelyi_2018/4ms", {"topology.kind": "nearest"})
-    space, faults = read_space({"topology": {"k": {"low": 3, "high": 12}}}, found)
-    assert not faults
+    space = read_space({"topology": {"k": {"low": 3, "high": 12}}}, found, ErrorCollector())
     values = {space.parameters([x])["topology.k"] for x in np.linspace(0.0, 1.0, 101)}
     assert values == set(range(3, 13))
-    assert read_space({"topology": {"k": {"fixed": 3.5}}}, found)[1] == [
-        "space.topology.k.fixed = 3.5 is not a whole number"
-    ]
-    assert read_space({"topology": {"k": {"low": 3, "high": 9, "integer": False}}}, found)[1]
+    errors = ErrorCollector()
+    assert read_space({"topology": {"k": {"fixed": 3.5}}}, found, errors) is None
+    assert errors.errors == ["space.topology.k.fixed = 3.5 is not a whole number"]
+    assert read_space({"topology": {"k": {"low": 3, "high": 9, "integer": False}}}, found, ErrorCollector()) is None
 
 
 def test_a_card_carries_the_topology():

@@ -5,8 +5,8 @@ import pytest
 
 from airflock.runs.search_space import full_space, with_parameters
 from airflock.scenarios.files import load
-from airflock.search.study_space import read_space
-from airflock.support.errors import ParameterError
+from airflock.search import study_space
+from airflock.support.errors import ErrorCollector, ParameterError
 
 SCENARIO = load("zapotecatl_2016/best")
 FLOCK = load("vasarhelyi_2018/6ms")
@@ -20,6 +20,11 @@ TABLE = {
         "w_a": {"tied": "model.w_c", "factor": 2.0, "offset": 1.0},
     }
 }
+
+
+def read_space(table, scenario):
+    errors = ErrorCollector()
+    return study_space.read_space(table, scenario, errors), errors.errors
 
 
 def space(table=TABLE, scenario=SCENARIO):

@@ -43,7 +43,7 @@ from airflock.search.limit_excess import allowed_probability, limit_excess
 from airflock.search.objectives import read_limits
 from airflock.search.search_settings import SearchSettings
 from airflock.search.study_result import mean_interval
-from airflock.support import ScenarioError
+from airflock.support import ErrorCollector, ScenarioError
 
 ScoreColumns = Mapping[str, NDArray[np.float64]]  # score → its values (seed,)
 
@@ -596,10 +596,10 @@ def harden_in_steps(trial: HardeningCandidate, steps: Sequence[HardeningStep]) -
 
 def hardening_request(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = ()) -> Constraints:
     """Return the constraints of a request. Raises ScenarioError with all errors together."""
-    held, errors = read_limits({"limits": limit}, scenarios)
-    errors += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
-    if errors:
-        raise ScenarioError(errors)
+    errors = ErrorCollector()
+    held = read_limits({"limits": limit}, scenarios, errors)
+    errors.add(*([] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]))
+    errors.raise_errors()
     return Constraints(held, cost)
 
 

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from airflock.certificates import EventLimit, parse_limits
 from airflock.scenarios import Scenario, import_user_file
 from airflock.support import (
+    ErrorCollector,
     RuleError,
     ScenarioError,
     StudyError,
     describe_error,
     expand_path,
     is_file,
+    is_number,
     shortened,
     suggest,
 )
@@ -118,88 +120,80 @@ KEYS = ("maximise", "minimise", "limits", "over_seeds", "quantile", "own", "sour
 
 
 def read_objectives(
-    table: Any, scenario: Scenario, folder: Path | None = None, *, trust: bool = False
-) -> tuple[tuple[Objective, ...], list[str]]:
-    """Objectives from a table, by default the scenario's usual fitness; and all errors in it.
+    table: Any, scenario: Scenario, errors: ErrorCollector, folder: Path | None = None, *, trust: bool = False
+) -> tuple[Objective, ...]:
+    """Read objectives from a table, by default the scenario's usual fitness.
 
     trust : whether the file of functions that objective.own names may run
     """
     if not isinstance(table, Mapping):
-        return (), [f"objective = {table!r} is not a table; write objective.maximise = {table!r}"]
-    errors = []
+        errors.add(f"objective = {table!r} is not a table; write objective.maximise = {table!r}")
+        return ()
     for key in table:
         if key not in KEYS:
             hint = suggest(key, KEYS, f"known: {', '.join(KEYS)}", prefix="objective.")
-            errors.append(f"objective.{key}: unknown key; {hint}")
+            errors.add(f"objective.{key}: unknown key; {hint}")
     over, quantile = table.get("over_seeds", "mean"), table.get("quantile", 0.1)
     if not isinstance(over, str) or over not in OVER_SEEDS:
-        errors.append(f"objective.over_seeds = {over!r} is none of {', '.join(OVER_SEEDS)}")
-    if not isinstance(quantile, (int, float)) or isinstance(quantile, bool) or not 0.0 <= quantile <= 1.0:
-        errors.append(f"objective.quantile = {quantile!r} lies outside [0, 1]")
+        errors.add(f"objective.over_seeds = {over!r} is none of {', '.join(OVER_SEEDS)}")
+    if not is_number(quantile) or not 0.0 <= quantile <= 1.0:
+        errors.add(f"objective.quantile = {quantile!r} lies outside [0, 1]")
         quantile = 0.1
-    own, text, file, more = _own(table.get("own"), folder, trust)
-    errors += more
-    found = []
+    own, text, file = _own(table.get("own"), folder, errors, trust)
+    goals: list[tuple[str, bool]] = []
     for key in ("maximise", "minimise"):
         named = table.get(key, [])
         names = [named] if isinstance(named, str) else named
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            errors.append(f"objective.{key} = {named!r} is neither a name nor a list of names")
+            errors.add(f"objective.{key} = {named!r} is neither a name nor a list of names")
             continue
-        how = (key == "maximise", str(over), float(quantile))
-        found += [Objective(n, *how, own.get(n), *((text, file) if n in own else ())) for n in names]
-    if not found:
-        name = scenario.metrics.rule.best or "fitness"
-        found = [
-            Objective(name, True, str(over), float(quantile), own.get(name), *((text, file) if name in own else ()))
-        ]
+        goals += [(name, key == "maximise") for name in names]
+    found = tuple(
+        Objective(name, more, str(over), float(quantile), own.get(name), *((text, file) if name in own else ()))
+        for name, more in goals or [(scenario.metrics.rule.best or "fitness", True)]
+    )
     if text and not any(objective.own for objective in found):
-        names = [
-            name
-            for name, function in own.items()
-            if getattr(function, "__module__", "") == Path(str(table["own"])).stem
-        ]
+        module = Path(str(table["own"])).stem
+        names = [name for name, function in own.items() if getattr(function, "__module__", "") == module]
         write = f"write objective.maximise = '{names[0]}'" if names else "it holds no function"
         others = f" (it holds {', '.join(names)})" if len(names) > 1 else ""
-        errors.append(f"objective.own = {table['own']!r}: no objective names a function of this file; {write}{others}")
-    return tuple(found), errors
+        errors.add(f"objective.own = {table['own']!r}: no objective names a function of this file; {write}{others}")
+    return found
 
 
-def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[EventLimit, ...], list[str]]:
-    """Limits that candidates are to keep in all scenarios, from the key `limits` of a table; and all errors in it."""
+def read_limits(table: Any, scenarios: Sequence[Scenario], errors: ErrorCollector) -> tuple[EventLimit, ...]:
+    """Read the limits that candidates are to keep in all scenarios, from the key `limits` of a table."""
     texts = table.get("limits", []) if isinstance(table, Mapping) else []
     texts = [texts] if isinstance(texts, str) else texts
     if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
-        return (), [f"objective.limits = {texts!r} is neither a limit nor a list of limits, as 'r_min<3 at 0.01/h'"]
+        errors.add(f"objective.limits = {texts!r} is neither a limit nor a list of limits, as 'r_min<3 at 0.01/h'")
+        return ()
     found: tuple[EventLimit, ...] = ()
-    errors: list[str] = []
     for scenario in scenarios if texts else ():
-        try:
-            found = found or parse_limits(list(texts), scenario)
-            parse_limits(list(texts), scenario)
-        except ScenarioError as error:
-            errors += [f"objective.limits: {line}" for line in error.errors]
-    errors += [
-        f"objective.limits: limit '{limit.text}': does not say how rarely; write {limit.event} at 0.01/h, for instance"
-        for limit in found
-        if limit.rate is None
-    ]
-    return found, list(dict.fromkeys(errors))
+        with errors.collecting("objective.limits: "):
+            parsed = parse_limits(list(texts), scenario)
+            found = found or parsed
+    how = "does not say how rarely; write {} at 0.01/h, for instance"
+    unsaid = [limit for limit in found if limit.rate is None]
+    errors.add(*(f"objective.limits: limit '{limit.text}': {how.format(limit.event)}" for limit in unsaid))
+    return found
 
 
-def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, UserFitness], str, str, list[str]]:
-    """Functions of a user's own file by name, a hash of its text, its place, and errors."""
+def _own(
+    name: Any, folder: Path | None, errors: ErrorCollector, trust: bool
+) -> tuple[dict[str, UserFitness], str, str]:
+    """Return the functions of a user's own file by name, a hash of its text, and its place."""
     if name is None:
-        return {}, "", "", []
+        return {}, "", ""
     path = expand_path(str(name)) if folder is None else folder / expand_path(str(name))
     if path.suffix != ".py" or not is_file(path):
-        return {}, "", "", [f"objective.own = {name!r}: no such Python file"]
+        errors.add(f"objective.own = {name!r}: no such Python file")
+        return {}, "", ""
     try:
         text = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
         module = import_user_file(path, f"objective.own = {name!r}", trust=trust)
-    except RuleError as error:
-        return {}, "", "", [f"objective.own: {error}"]
-    except ScenarioError as error:
-        return {}, "", "", error.errors
+    except (RuleError, ScenarioError) as error:
+        errors.add(*(error.errors if isinstance(error, ScenarioError) else [f"objective.own: {error}"]))
+        return {}, "", ""
     own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
-    return own, text, str(path), []
+    return own, text, str(path)

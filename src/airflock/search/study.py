@@ -238,11 +238,6 @@ def study_of_request(
     )  # fmt: skip
 
 
-def _once(where: str, error: str) -> str:
-    """Prefix an error with the name of its file, but not twice."""
-    return error if error.startswith(f"{where}: ") else f"{where}: {error}"
-
-
 def make_study(
     document: Mapping[str, Any],
     where: str = "study",
@@ -259,46 +254,44 @@ def make_study(
     scenario : in place of its key of that name; or several, in place of `scenarios`
     limits   : in place of those of its objective; each candidate then flies twice at least, unless `search` has seeds
     """
-    document, errors = formats.to_current_format(document, where), []
+    document, errors = formats.to_current_format(document, where), ErrorCollector()
     for key in document:
         if key not in KEYS:
             of_settings = key in {field.name for field in fields(SearchSettings)}
             hint = f"did you mean search.{key}?" if of_settings else suggest(key, KEYS, f"known: {', '.join(KEYS)}")
-            errors.append(f"{key}: unknown key; {hint}")
+            errors.add(f"{key}: unknown key; {hint}")
     table = document.get("search", {})
-    of_search = ErrorCollector()
     table = {**table, **(search or {})} if isinstance(table, Mapping) else table
-    found, _ = schema.read_section("search", table, SearchSettings, of_search)
-    errors += of_search.errors
+    found, _ = schema.read_section("search", table, SearchSettings, errors)
     if scenario is None:
-        scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
-        if more or not scenarios:
-            named = [*(f"{where}: {error}" for error in errors), *(_once(where, error) for error in more)]
-            raise ScenarioError(named)
+        of_scenarios = ErrorCollector()
+        scenarios, labels = read_scenarios(document, settings or {}, folder, trust, of_scenarios)
+        if of_scenarios:
+            # An error of a scenario file may begin with the name of the study's file already.
+            lines = (error.removeprefix(f"{where}: ") for error in (*errors.errors, *of_scenarios.errors))
+            raise ScenarioError([f"{where}: {error}" for error in lines])
     else:
         scenarios = (scenario,) if isinstance(scenario, Scenario) else tuple(scenario)
         labels = distinct_labels([each.name for each in scenarios])
     space: SearchSpace | None
     notes: list[str] = []
     if "space" in document:
-        space, more = read_space(document["space"], scenarios[0])
-        errors += more
+        space = read_space(document["space"], scenarios[0], errors)
     else:
         space, notes = common_space(scenarios)
-    over = document.get("over_scenarios", "mean")
-    errors += joint_errors(scenarios, labels, space, over)
-    objectives, more = read_objectives(document.get("objective", {}), scenarios[0], folder, trust=trust)
-    kept, of_limits = read_limits({"limits": list(limits)} if limits else document.get("objective", {}), scenarios)
-    errors += more + of_limits
+    over, goals = document.get("over_scenarios", "mean"), document.get("objective", {})
+    errors.add(*joint_errors(scenarios, labels, space, over))
+    objectives = read_objectives(goals, scenarios[0], errors, folder, trust=trust)
+    kept = read_limits({"limits": list(limits)} if limits else goals, scenarios, errors)
     if found is not None:
         # One flight has no spread, and limits are judged by the spread of flights.
         if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
             found = replace(found, seeds=2.0)
-        errors += search_errors(found, objectives, space, limits=bool(kept))
-    if errors or space is None or found is None:
-        raise ScenarioError([f"{where}: {error}" for error in errors])
+        errors.add(*search_errors(found, objectives, space, limits=bool(kept)))
+    errors.raise_errors(where)
+    assert space is not None and found is not None, "what could not be read is an error"
     return Study(
-        scenarios[0], space, objectives, found, str(document.get("title", "")), notes=(*notes, *of_search.notes),
+        scenarios[0], space, objectives, found, str(document.get("title", "")), notes=(*notes, *errors.notes),
         others=scenarios[1:], over_scenarios=str(over), labels=labels, limits=kept,
     )  # fmt: skip
 
@@ -318,44 +311,37 @@ def combine_scenarios(values: Sequence[float | None], over_scenarios: str, maxim
 
 
 def read_scenarios(
-    document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None, trust: bool
-) -> tuple[tuple[Scenario, ...], tuple[str, ...], list[str]]:
-    """Scenarios of a study's document, what to call each, and all errors.
+    document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None, trust: bool, errors: ErrorCollector
+) -> tuple[tuple[Scenario, ...], tuple[str, ...]]:
+    """Read the scenarios of a study's document, and how each is called.
 
     settings : keys to change in all of them, as the document's table `set` does
     """
-    keys = document.get("set", {})
+    keys, one = document.get("set", {}), document.get("scenario")
+    entries = document.get("scenarios", [one])
     if not isinstance(keys, Mapping):
-        return (), (), [f"set = {shortened(repr(keys), 80)} is not a table"]
-    if "scenarios" not in document:
-        entries: Any = [document.get("scenario")]
-        if not isinstance(entries[0], str):
-            given = f" = {shortened(repr(entries[0]), 80)} is not a name" if "scenario" in document else " is missing"
-            return (), (), [f'scenario{given}; write scenario = "NAME", of a preset or a scenario file']
-    else:
-        entries = document["scenarios"]
-        if "scenario" in document:
-            return (), (), ["scenario and scenarios are both given; leave out one"]
-        if not isinstance(entries, list) or not entries:
-            return (), (), [f"scenarios = {shortened(repr(entries), 80)} is not a list of presets, files or tables"]
+        errors.add(f"set = {shortened(repr(keys), 80)} is not a table")
+    elif "scenarios" not in document and not isinstance(one, str):
+        given = f" = {shortened(repr(one), 80)} is not a name" if "scenario" in document else " is missing"
+        errors.add(f'scenario{given}; write scenario = "NAME", of a preset or a scenario file')
+    elif "scenarios" in document and "scenario" in document:
+        errors.add("scenario and scenarios are both given; leave out one")
+    elif not isinstance(entries, list) or not entries:
+        errors.add(f"scenarios = {shortened(repr(entries), 80)} is not a list of presets, files or tables")
     found: list[Scenario] = []
     labels: list[str] = []
-    errors: list[str] = []
-    for i, entry in enumerate(entries):
-        name, own, more = _entry(entry, i)
-        errors += more
-        if more:
-            continue
-        beside = folder / name if folder is not None else None
+    for i, entry in enumerate(() if errors else entries):
         try:
+            name, own = _entry(entry, i)
+            beside = folder / name if folder is not None else None
             path = beside if beside is not None and is_file(beside) else name
             found.append(load(path, {**keys, **own, **settings}, trust=trust))
         except ScenarioError as error:
-            errors += error.errors
+            errors.add(*error.errors)
             continue
         detail = ", ".join(f"{key} = {value}" for key, value in own.items())
         labels.append(f"{name} with {detail}" if detail else name)
-    return tuple(found), distinct_labels(labels), errors
+    return tuple(found), distinct_labels(labels)
 
 
 def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
@@ -363,19 +349,21 @@ def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{label} ({i + 1})" if label in labels[:i] else label for i, label in enumerate(labels))
 
 
-def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
-    """Return name and own settings of an entry of `scenarios`, and its errors."""
+def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any]]:
+    """Return name and own settings of an entry of `scenarios`. Raises ScenarioError, all errors together."""
     at = f"scenarios[{number}]"
     if isinstance(entry, str):
-        return entry, {}, []
+        return entry, {}
     if not isinstance(entry, Mapping) or not isinstance(entry.get("scenario"), str):
         how = 'write a name, or { scenario = "NAME", set = { "radio.delay" = 1.0 } }'
-        return "", {}, [f"{at} = {shortened(repr(entry), 80)} names no scenario; {how}"]
+        raise ScenarioError([f"{at} = {shortened(repr(entry), 80)} names no scenario; {how}"])
     errors = [f"{at}.{key}: unknown key; known: {', '.join(ENTRY_KEYS)}" for key in entry if key not in ENTRY_KEYS]
     own = entry.get("set", {})
     if not isinstance(own, Mapping):
         errors.append(f"{at}.set = {shortened(repr(own), 80)} is not a table")
-    return str(entry["scenario"]), own if isinstance(own, Mapping) else {}, errors
+    if errors:
+        raise ScenarioError(errors)
+    return str(entry["scenario"]), own
 
 
 def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]:

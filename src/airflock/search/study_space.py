@@ -10,35 +10,30 @@ from typing import Any
 from airflock.core import Quantity, format_with_unit, number_names
 from airflock.runs import SearchAxis, SearchSpace, TiedParameter, declared_numbers, default_scale, full_space
 from airflock.scenarios import Scenario, largest_extension, load
-from airflock.support import read_toml, suggest
+from airflock.support import ErrorCollector, is_number, read_toml, suggest
 
 ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "factor", "offset", "source", "note")
 
 
-def read_space(table: Any, scenario: Scenario) -> tuple[SearchSpace | None, list[str]]:
-    """Space from the table [space] of a study file, or None; and all errors in it. Only what is listed varies."""
-    known = declared_numbers(scenario)
-    entries, errors = _entries(table)
+def read_space(table: Any, scenario: Scenario, errors: ErrorCollector) -> SearchSpace | None:
+    """Read the space from the table [space] of a study file; None where it has errors. Only what is listed varies."""
+    known, wrong = declared_numbers(scenario), ErrorCollector()
     axes: list[SearchAxis] = []
     fixed: dict[str, float] = {}
     tied: dict[str, TiedParameter] = {}
-    for key, entry in entries.items():
+    for key, entry in _entries(table, wrong).items():
         if key not in known:
             hint = suggest(key, known, lead="; ", prefix="space.")
             if key.startswith("aero.") and not scenario.is_aerodynamic:
                 hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
-            errors.append(f"space.{key} is not a number of {scenario.name}{hint}")
-            continue
-        more = _entry_faults(key, entry, known[key][0], known)
-        errors += more
-        if more:
-            continue
-        if "fixed" in entry:
+            wrong.add(f"space.{key} is not a number of {scenario.name}{hint}")
+        elif of_entry := _entry_errors(key, entry, known[key][0], known):
+            wrong.add(*of_entry)
+        elif "fixed" in entry:
             fixed[key] = float(entry["fixed"])
         elif "tied" in entry:
-            tied[key] = TiedParameter(
-                str(entry["tied"]), float(entry.get("factor", 1.0)), float(entry.get("offset", 0.0))
-            )
+            tie = float(entry.get("factor", 1.0)), float(entry.get("offset", 0.0))
+            tied[key] = TiedParameter(str(entry["tied"]), *tie)
         else:
             axes.append(_axis(key, entry, known[key][0]))
     for axis in axes:  # a number that another one must stay above takes part even if it does not vary
@@ -46,8 +41,8 @@ def read_space(table: Any, scenario: Scenario) -> tuple[SearchSpace | None, list
         if other in known and other not in {a.key for a in axes} | set(fixed) and known[other][1] is not None:
             fixed[other] = float(known[other][1] or 0.0)
     space = SearchSpace(tuple(axes), fixed, tied)
-    errors += _faults_between(space, known, bool(errors))
-    return (None if errors else space), errors
+    wrong.add(*_errors_between(space, known, bool(wrong)))
+    return None if errors.merge(wrong) else space
 
 
 def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> SearchAxis:
@@ -58,33 +53,29 @@ def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> SearchAxis:
     )
 
 
-def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
-    """Key → entry, from sections or dotted keys."""
-    found: dict[str, Mapping[str, Any]] = {}
-    errors = []
+def _entries(table: Any, errors: ErrorCollector) -> dict[str, Mapping[str, Any]]:
+    """Return key → entry, from sections or dotted keys."""
     if not isinstance(table, Mapping):
-        return {}, [f"space = {table!r} is not a table of keys"]
+        errors.add(f"space = {table!r} is not a table of keys")
+        return {}
+    found: dict[str, Any] = {}
     for section, entries in table.items():
-        if not isinstance(entries, Mapping):
-            errors.append(f"space.{section} = {entries!r} is not a table; write {{ low = ..., high = ... }}")
-        elif "." in section or (entries and set(entries) <= set(ENTRY)):
+        if not isinstance(entries, Mapping) or "." in section or (entries and set(entries) <= set(ENTRY)):
             found[section] = entries
         else:
-            for name, entry in entries.items():
-                if isinstance(entry, Mapping):
-                    found[f"{section}.{name}"] = entry
-                else:
-                    errors.append(
-                        f"space.{section}.{name} = {entry!r} is not a table; write {{ low = ..., high = ... }}"
-                    )
-    return found, errors
+            found |= {f"{section}.{name}": entry for name, entry in entries.items()}
+    no_tables = {key: entry for key, entry in found.items() if not isinstance(entry, Mapping)}
+    errors.add(
+        *(f"space.{k} = {entry!r} is not a table; write {{ low = ..., high = ... }}" for k, entry in no_tables.items())
+    )
+    return {key: entry for key, entry in found.items() if key not in no_tables}
 
 
-def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
+def _entry_errors(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
     """Return the errors of one entry by itself."""
     errors = []
     for name, value in entry.items():
-        numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        numeric = is_number(value) and math.isfinite(value)
         if name not in ENTRY:
             errors.append(f"space.{key}.{name}: unknown key; {suggest(name, ENTRY, ', '.join(ENTRY))}")
         elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
@@ -107,10 +98,10 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
             errors.append(f"space.{key}.{name} = {value!r} is not a number{suggest(value, known, lead='; ')}")
     if errors or "fixed" in entry or "tied" in entry:
         return errors
-    return _range_faults(_axis(key, entry, how))
+    return _range_errors(_axis(key, entry, how))
 
 
-def _range_faults(axis: SearchAxis) -> list[str]:
+def _range_errors(axis: SearchAxis) -> list[str]:
     where, span = f"space.{axis.key}", format_with_unit(f"[{axis.low:g}, {axis.high:g}]", axis.unit)
     if not axis.low < axis.high:
         word = "empty" if axis.low == axis.high else "inverted"
@@ -122,7 +113,7 @@ def _range_faults(axis: SearchAxis) -> list[str]:
     return []
 
 
-def _faults_between(
+def _errors_between(
     space: SearchSpace, known: Mapping[str, tuple[Quantity, float | None]], is_reported: bool
 ) -> list[str]:
     """Ties and orders that cannot hold."""
@@ -235,7 +226,7 @@ def _studies() -> list[tuple[str, str, float, tuple[SearchAxis, ...]]]:
         if "scenario" not in document:  # one set for several scenarios: no speed of its own
             continue
         scenario = load(str(document["scenario"]), document.get("set"))
-        space, _ = read_space(document["space"], scenario) if "space" in document else (None, [])
+        space = read_space(document["space"], scenario, ErrorCollector()) if "space" in document else None
         found.append((name, scenario.model.name, _speed(scenario), space.axes if space else ()))
     return found
 
