@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from airflock.search.optimisers import BinaryGenetic, decode, minimise_over_bits
+from airflock.search.optimisers import binary_genetic, decode
 from airflock_papers.breaks import in_words
 from airflock_papers.dimock_2003.flights import Birds, Start, Task, holds_vee, in_row, spacing
 from airflock_papers.dimock_2003.ga import (
@@ -25,6 +25,7 @@ from airflock_papers.dimock_2003.ga import (
     Reading,
     Run,
     losses_of,
+    minimise_over_bits,
     settings_of,
 )
 from airflock_papers.dimock_2003.units import FOOT, FT_LBF, HIGH, LOW, Gains
@@ -65,10 +66,11 @@ def searched(keys: dict[str, Any], seed: int, generations: int) -> tuple[Birds, 
     run = Run(Reading(own.pop("model.centroid", READINGS["mean"].centroid), start), seed)
     birds = Birds(changes=own)
     losses = losses_of(birds, run)
-    state = BinaryGenetic(50, POPULATION, seed, **{name: keys[name] for name in OPERATORS if name in keys})
+    state = binary_genetic(50, POPULATION, seed, **{name: keys[name] for name in OPERATORS if name in keys})
     state.algorithm.mating.selection.pressure = keys.get("pressure", PRESSURE)
     for _ in range(generations):
-        state.tell(losses(decode(state.ask())))
+        bits = state.ask()
+        state.tell(bits, losses(decode(bits)))
     return birds, run
 
 

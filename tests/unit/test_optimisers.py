@@ -9,8 +9,9 @@ from airflock.runs.flight_store import FlightStore
 from airflock.search.finals import race_candidates
 from airflock.search.generations import Evaluator
 from airflock.search.objectives import Objective, candidate_losses
-from airflock.search.optimisers import BinaryGenetic, decode, make_optimiser, minimise_over_bits, pareto_front
+from airflock.search.optimisers import binary_genetic, decode, make_optimiser, pareto_front
 from airflock.support.errors import StudyError
+from airflock_papers.dimock_2003.ga import minimise_over_bits
 
 
 def run(algorithm, f, dimension, objectives, population, generations, seed):
@@ -89,17 +90,17 @@ def test_chromosomes_decode_by_1024_with_the_highest_bit_first():
 
 def test_generations_of_the_genetic_algorithm_replace_their_parents(seed):
     """Without selection, cut or flip, children are copies of parents; with a flip of every bit, their negatives."""
-    state = BinaryGenetic(16, 20, seed, mutation=0.0, crossover=0.0)
+    state = binary_genetic(16, 20, seed, mutation=0.0, crossover=0.0)
     first = state.ask()
-    state.tell(np.zeros(20))
+    state.tell(first, np.zeros(20))
     second = state.ask()
     assert {tuple(row) for row in second} <= {tuple(row) for row in first}
-    flipped = BinaryGenetic(16, 20, seed, mutation=1.0, crossover=0.0)
+    flipped = binary_genetic(16, 20, seed, mutation=1.0, crossover=0.0)
     first = flipped.ask()
-    flipped.tell(np.zeros(20))
+    flipped.tell(first, np.zeros(20))
     assert {tuple(~row) for row in flipped.ask()} <= {tuple(row) for row in first}
     with pytest.raises(StudyError, match="odd"):
-        BinaryGenetic(10, 5)
+        binary_genetic(10, 5)
 
 
 def test_front_holds_exactly_those_whom_nobody_betters(seed):

@@ -18,8 +18,8 @@ from .hardening import (
 from .limit_excess import limit_report_line as limit_report_line
 from .optimisers import (
     CMAES as CMAES,
+    binary_genetic as binary_genetic,
     decode as decode,
-    minimise_over_bits as minimise_over_bits,
 )
 from .search_settings import SearchSettings as SearchSettings
 from .study import load_study as load_study

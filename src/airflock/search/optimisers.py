@@ -2,7 +2,8 @@
 
 import warnings
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,10 +68,9 @@ class CMAES:
 
 BITS = 10  # per parameter; 50 bits for five of them
 MUTATION = 0.01
-BitArray = NDArray[np.bool_]
 
 
-def decode(bits: BitArray, bits_per_parameter: int = BITS) -> NDArray[np.float64]:
+def decode(bits: NDArray[np.bool_], bits_per_parameter: int = BITS) -> NDArray[np.float64]:
     """Numbers in [0, 1) from bits (..., parameter * per), the highest bit first: (..., parameter).
 
     The divisor is 1024: the published controller lies on k / 1024 and not on k / 1023.
@@ -80,95 +80,52 @@ def decode(bits: BitArray, bits_per_parameter: int = BITS) -> NDArray[np.float64
     return np.asarray(np.asarray(bits, float).reshape(shape) @ weights / 2.0**bits_per_parameter)
 
 
-class BinaryGenetic:
-    """Generational genetic algorithm: ask for bits (candidate, bit), tell losses (candidate,)."""
+class PymooOptimiser:
+    """An algorithm of pymoo: ask for a generation of points, tell their losses (candidate, objective)."""
 
-    def __init__(
-        self, bits: int, population: int = 50, seed: int = 0, *, mutation: float = MUTATION, crossover: float = 1.0
-    ):
-        """`mutation` flips each bit, `crossover` is the probability that a pair of parents is cut at all."""
-        if population % 2:
-            raise StudyError(
-                f"population = {population} is odd: pairs of parents have two children; give an even number"
-            )
-        self.algorithm = _pymoo_genetic(bits, population, seed, mutation, crossover)
-        self.generation: Any = None
+    def __init__(self, algorithm: Any, problem: Any, seed: int, convert: Callable[[Any], Any]):
+        """`convert` makes points of the algorithm's own candidates; `seed` decides all random numbers."""
+        from pymoo.core.termination import NoTermination
 
-    def ask(self) -> BitArray:
-        """Return the next generation (candidate, bit)."""
+        self.algorithm, self.convert, self.generation = algorithm, convert, None
+        algorithm.setup(problem, termination=NoTermination(), seed=seed, verbose=False)
+
+    def ask(self) -> NDArray[Any]:
+        """Return the next generation (candidate, axis)."""
         self.generation = self.algorithm.ask()
-        return np.array(self.generation.get("X"), bool)
+        return np.asarray(self.convert(np.array(self.generation.get("X"))))
 
-    def tell(self, losses: NDArray[np.float64]) -> None:
-        """Take the losses (candidate,) of the last generation; less is better."""
-        self.generation.set("F", np.asarray(losses, float).reshape(-1, 1))
+    def tell(self, points: NDArray[Any], losses: NDArray[np.float64]) -> None:
+        """Take the losses (candidate, objective) of the last generation; less is better."""
+        self.generation.set("F", np.asarray(losses, float).reshape(len(points), -1))
         self.algorithm.tell(infills=self.generation)
 
-
-class GeneticResult(NamedTuple):
-    """Best chromosome ever, its loss, and the best and the mean loss of each generation."""
-
-    bits: BitArray
-    loss: float
-    best: list[float]
-    mean: list[float]
-
-
-def minimise_over_bits(
-    losses: Callable[[BitArray], NDArray[np.float64]],
-    bits: int,
-    *,
-    population: int = 50,
-    generations: int = 150,
-    mutation: float = MUTATION,
-    crossover: float = 1.0,
-    seed: int = 0,
-) -> GeneticResult:
-    """Minimise over bits. `losses` takes a whole generation (candidate, bit) and returns (candidate,)."""
-    state = BinaryGenetic(bits, population, seed, mutation=mutation, crossover=crossover)
-    winner, least, best, mean = np.zeros(bits, bool), np.inf, [], []
-    for _ in range(generations):
-        chromosomes = state.ask()
-        found = np.asarray(losses(chromosomes), float)
-        state.tell(found)
-        i = int(np.argmin(found))
-        if found[i] < least:
-            winner, least = chromosomes[i].copy(), float(found[i])
-        best.append(float(found[i]))
-        mean.append(float(found.mean()))
-    return GeneticResult(winner, least, best, mean)
-
-
-class GeneticSearch:
-    """The genetic algorithm on a study's unit cube, ten bits an axis."""
-
-    def __init__(self, dimension: int, population: int, seed: int):
-        """Chromosomes of ten bits for each of `dimension` axes."""
-        self.state = BinaryGenetic(BITS * dimension, population, seed)
-
-    def ask(self) -> NDArray[np.float64]:
-        """Return the next generation (candidate, axis)."""
-        return decode(self.state.ask())
-
-    def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
-        """Take the losses (candidate, 1) of the last generation."""
-        self.state.tell(losses[:, 0])
-
     def centre(self) -> None:
-        """Return None: a population of chromosomes has no mean."""
+        """Return None: neither a population nor a front has a mean."""
 
 
-def _pymoo_genetic(bits: int, population: int, seed: int, mutation: float, crossover: float) -> Any:
-    try:
-        from pymoo.algorithms.soo.nonconvex.ga import GA
-        from pymoo.core.problem import Problem
-        from pymoo.core.termination import NoTermination
-        from pymoo.operators.crossover.pntx import SinglePointCrossover
-        from pymoo.operators.mutation.bitflip import BitflipMutation
-        from pymoo.operators.sampling.rnd import BinaryRandomSampling
-        from pymoo.operators.selection.tournament import TournamentSelection
-    except ModuleNotFoundError as error:
-        raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from error
+def _need_pymoo(what: str) -> None:
+    if find_spec("pymoo") is None:
+        raise StudyError(f"{what} needs pymoo: pip install 'airflock[evolve]'")
+
+
+def binary_genetic(
+    bits: int, population: int = 50, seed: int = 0, *, mutation: float = MUTATION, crossover: float = 1.0,
+    convert: Callable[[Any], Any] = np.array,
+) -> PymooOptimiser:  # fmt: skip
+    """Make a generational genetic algorithm over bits (candidate, bit).
+
+    `mutation` flips each bit, `crossover` is the probability that a pair of parents is cut at all.
+    """
+    if population % 2:
+        raise StudyError(f"population = {population} is odd: pairs of parents have two children; give an even number")
+    _need_pymoo("the genetic algorithm")
+    from pymoo.algorithms.soo.nonconvex.ga import GA
+    from pymoo.core.problem import Problem
+    from pymoo.operators.crossover.pntx import SinglePointCrossover
+    from pymoo.operators.mutation.bitflip import BitflipMutation
+    from pymoo.operators.sampling.rnd import BinaryRandomSampling
+    from pymoo.operators.selection.tournament import TournamentSelection
 
     # pymoo merges parents and children and keeps the best. The published algorithm replaces the
     # whole population.
@@ -190,30 +147,7 @@ def _pymoo_genetic(bits: int, population: int, seed: int, mutation: float, cross
         mutation=BitflipMutation(prob=1.0, prob_var=mutation),
         eliminate_duplicates=False,
     )
-    algorithm.setup(Problem(n_var=bits, n_obj=1, vtype=bool), termination=NoTermination(), seed=seed, verbose=False)
-    return algorithm
-
-
-class NonDominatedSorting:
-    """Ask for points of the unit cube, tell their losses (candidate, objective)."""
-
-    def __init__(self, dimension: int, objectives: int, population: int, seed: int):
-        """Set up NSGA-II with pymoo's default operators."""
-        self.algorithm = _pymoo_nsga2(dimension, objectives, population, seed)
-        self.generation: Any = None
-
-    def ask(self) -> NDArray[np.float64]:
-        """Return the next generation (candidate, axis)."""
-        self.generation = self.algorithm.ask()
-        return np.array(self.generation.get("X"), float)
-
-    def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
-        """Take the losses (candidate, objective) of the last generation."""
-        self.generation.set("F", np.asarray(losses, float))
-        self.algorithm.tell(infills=self.generation)
-
-    def centre(self) -> None:
-        """Return None: a front has no mean."""
+    return PymooOptimiser(algorithm, Problem(n_var=bits, n_obj=1, vtype=bool), seed, convert)
 
 
 def pareto_front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -231,34 +165,18 @@ def pareto_front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.sort(kept[:n])
 
 
-def _pymoo_nsga2(dimension: int, objectives: int, population: int, seed: int) -> Any:
-    try:
-        from pymoo.algorithms.moo.nsga2 import NSGA2
-        from pymoo.core.problem import Problem
-        from pymoo.core.termination import NoTermination
-    except ModuleNotFoundError as error:
-        raise StudyError("nsga2 needs pymoo: pip install 'airflock[evolve]'") from error
-    algorithm = NSGA2(pop_size=population, eliminate_duplicates=False)
+def non_dominated_sorting(dimension: int, objectives: int, population: int, seed: int) -> PymooOptimiser:
+    """Make NSGA-II with pymoo's default operators, over points of the unit cube."""
+    _need_pymoo("nsga2")
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem
+
     problem = Problem(n_var=dimension, n_obj=objectives, xl=np.zeros(dimension), xu=np.ones(dimension))
-    algorithm.setup(problem, termination=NoTermination(), seed=seed, verbose=False)
-    return algorithm
+    return PymooOptimiser(NSGA2(pop_size=population, eliminate_duplicates=False), problem, seed, np.asarray)
 
 
 ALGORITHMS = ("cmaes", "ga", "nsga2")
 MULTI_OBJECTIVE = "nsga2"  # the one for several objectives
-
-
-class Optimiser(Protocol):
-    """State of a search. The same seed and the same losses give the same points, bit by bit."""
-
-    def ask(self) -> NDArray[np.float64]:
-        """Return the next generation (candidate, axis)."""
-
-    def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
-        """Losses (candidate, objective) of those points; less is better."""
-
-    def centre(self) -> NDArray[np.float64] | None:
-        """Mean of the search's distribution (axis,), if it has one."""
 
 
 def make_optimiser(
@@ -270,11 +188,13 @@ def make_optimiser(
     *,
     spread: float = START_SIGMA,
     start: NDArray[np.float64] | None = None,
-) -> Optimiser:
-    """A fresh optimiser; CMA-ES starts with a standard deviation `spread` at the point `start`, else in the middle."""
+) -> CMAES | PymooOptimiser:
+    """Make a fresh optimiser: the same seed and the same losses give the same points, bit by bit.
+
+    CMA-ES starts with a standard deviation `spread` at the point `start`, else in the middle.
+    """
     if algorithm == "cmaes":
         return CMAES(dimension, population, seed, spread, start)
-
     if algorithm == "ga":
-        return GeneticSearch(dimension, population, seed)
-    return NonDominatedSorting(dimension, objectives, population, seed)
+        return binary_genetic(BITS * dimension, population, seed, convert=decode)
+    return non_dominated_sorting(dimension, objectives, population, seed)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.search import CMAES, decode, minimise_over_bits
+from airflock.search import CMAES, binary_genetic, decode
 from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task, in_row
 from airflock_papers.dimock_2003.units import Gains, gains
 
@@ -19,6 +19,40 @@ EARLY, MIDWAY = 5, 13  # generations of Figs 6 and 7
 TIMID = 2.0  # ft/s: a small K_a, as the paper counts it
 GREEDY = 50.0  # ft²/(lbf s): a high K_d, the upper half of its range
 Points = NDArray[np.float64]
+
+
+class GeneticResult(NamedTuple):
+    """Best chromosome ever, its loss, and the best and the mean loss of each generation."""
+
+    bits: NDArray[np.bool_]
+    loss: float
+    best: list[float]
+    mean: list[float]
+
+
+def minimise_over_bits(
+    losses: Callable[[NDArray[np.bool_]], NDArray[np.float64]],
+    bits: int,
+    *,
+    population: int = 50,
+    generations: int = 150,
+    mutation: float = 0.01,
+    crossover: float = 1.0,
+    seed: int = 0,
+) -> GeneticResult:
+    """Minimise over bits. `losses` takes a whole generation (candidate, bit) and returns (candidate,)."""
+    state = binary_genetic(bits, population, seed, mutation=mutation, crossover=crossover)
+    winner, least, best, mean = np.zeros(bits, bool), np.inf, [], []
+    for _ in range(generations):
+        chromosomes = state.ask()
+        found = np.asarray(losses(chromosomes), float)
+        state.tell(chromosomes, found)
+        i = int(np.argmin(found))
+        if found[i] < least:
+            winner, least = chromosomes[i].copy(), float(found[i])
+        best.append(float(found[i]))
+        mean.append(float(found.mean()))
+    return GeneticResult(winner, least, best, mean)
 
 
 class Reading(NamedTuple):
