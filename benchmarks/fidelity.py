@@ -19,7 +19,7 @@ from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import read_request
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.scenario_builder import build_scenario, rebuilt
-from airflock.search.study_space import read_space
+from airflock.search.study import read_space
 from airflock.support import ErrorCollector
 
 PARTS = {"early": (2, 4, 6, 8, 10, 12), "late": (40, 46, 52, 58, 64, 70)}  # generations, five candidates of each

@@ -24,7 +24,7 @@ from airflock.runs.folder import read_request
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.optimisers import CMAES
-from airflock.search.study_space import read_space
+from airflock.search.study import read_space
 from airflock.support import ErrorCollector
 
 TOLD = (2, 5, 10, 20, 30, 40, 50, 60, 71)  # generations

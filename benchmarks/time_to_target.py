@@ -32,8 +32,7 @@ from airflock.search import generations
 from airflock.search.evolution import run_study, study_executor
 from airflock.search.generations import averaged_means
 from airflock.search.optimisers import make_optimiser
-from airflock.search.search_settings import FAST
-from airflock.search.study import load_study
+from airflock.search.study import FAST, load_study
 from airflock.search.study_result import mean_interval
 from airflock.support import atomic
 

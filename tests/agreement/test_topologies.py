@@ -15,7 +15,7 @@ from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.engine import plan_of
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search.study_space import read_space
+from airflock.search.study import read_space
 from airflock.support.errors import CardError, ErrorCollector, ScenarioError
 from fleets import document, scenario
 from flocks import ISLANDS, interpreted

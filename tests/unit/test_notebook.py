@@ -14,8 +14,7 @@ from airflock.parts.metrics import metric_sets as registry
 from airflock.recordings.measures import milling
 from airflock.runs.executors import ThreadExecutor
 from airflock.runs.flight_store import FlightStore
-from airflock.search.finals import conclude_study
-from airflock.search.generations import run_search
+from airflock.search.generations import conclude_study, run_search
 from airflock.search.study import load_study
 from airflock.support.errors import ParameterError, RecordingError, ScenarioError
 from processes import called

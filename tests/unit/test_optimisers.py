@@ -6,8 +6,7 @@ import pytest
 import toys
 from airflock.runs.executors import ThreadExecutor
 from airflock.runs.flight_store import FlightStore
-from airflock.search.finals import race_candidates
-from airflock.search.generations import Evaluator
+from airflock.search.generations import Evaluator, race_candidates
 from airflock.search.objectives import Objective, candidate_losses
 from airflock.search.optimisers import binary_genetic, decode, make_optimiser, pareto_front
 from airflock.support.errors import StudyError

@@ -8,10 +8,8 @@ from airflock.runs.executors import ThreadExecutor
 from airflock.runs.flight_store import FlightStore
 from airflock.runs.search_space import declared_numbers, with_parameters
 from airflock.scenarios.files import load, presets
-from airflock.search.finals import conclude_study
-from airflock.search.generations import run_search
-from airflock.search.study import load_study, make_study
-from airflock.search.study_space import default_space, unread_keys
+from airflock.search.generations import conclude_study, run_search
+from airflock.search.study import default_space, load_study, make_study, unread_keys
 from airflock.support.errors import StudyError
 
 OWN = {"agents": 12, "world.side": 120.0}

@@ -5,7 +5,7 @@ import pytest
 
 from airflock.runs.search_space import full_space, with_parameters
 from airflock.scenarios.files import load
-from airflock.search import study_space
+from airflock.search import study
 from airflock.support.errors import ErrorCollector, ParameterError
 
 SCENARIO = load("zapotecatl_2016/best")
@@ -24,7 +24,7 @@ TABLE = {
 
 def read_space(table, scenario):
     errors = ErrorCollector()
-    return study_space.read_space(table, scenario, errors), errors.errors
+    return study.read_space(table, scenario, errors), errors.errors
 
 
 def space(table=TABLE, scenario=SCENARIO):

@@ -20,8 +20,7 @@ from airflock.engine import Flight
 from airflock.parts.laws import vasarhelyi_2018
 from airflock.recordings.recording_files import load_recording
 from airflock.scenarios.files import presets
-from airflock.search.study import load_study
-from airflock.search.study_space import shipped_study_axes
+from airflock.search.study import load_study, shipped_study_axes
 from airflock.studio import access_token, browser_view, page_measures as measures
 from airflock.studio.browser_view import FRAMES_PER_PIECE, Trails
 from airflock.studio.flight_pane import (

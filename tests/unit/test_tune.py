@@ -19,7 +19,7 @@ from airflock.runs.folder import Interrupted, read_request
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import tuning_run as tuning
-from airflock.search.finals import RACE_ROUNDS
+from airflock.search.generations import RACE_ROUNDS
 from airflock.search.tune_report import default_rows, replay_files
 from airflock.search.tuning_run import (
     CERTIFY_SHARE,

@@ -123,7 +123,7 @@ def rule_trials(
         by = [unit_factor(unit, units) for unit in ANSWERS.get(case[0], ("1",))]
         return in_other_units(case, units, command), np.array(by)
 
-    givens = [given for _, given in cases[: 5 * len(rules) : len(rules)]]
+    givens = [given for _, given in cases[: 5 * len(rules) : max(len(rules), 1)]]
     return Trials(part, rules, letter, numbers, answer or returned, cases, seed, scale, givens, **how)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from airflock.core.contract import (
     COMMANDS,
+    along_axes,
     argument_names,
     call_rule,
     check_memory_record,
@@ -20,12 +21,8 @@ from airflock.core.parameters import Parameters, quantity
 from airflock.support import RuleError
 
 STATE = {
-    "x": "position, east, m",
-    "y": "position, north, m",
-    "z": "position, up, m",
-    "vx": "velocity, east, m/s",
-    "vy": "velocity, north, m/s",
-    "vz": "velocity, up, m/s",
+    **along_axes("", "position", "m"),
+    **along_axes("v", "velocity", "m/s"),
 }
 COMMAND = {
     "cx": "command, east; m/s or m/s² as the model's COMMAND says",
@@ -33,19 +30,11 @@ COMMAND = {
     "cz": "command, up; m/s or m/s² as the model's COMMAND says",
 }
 MOTION = {
-    "vx": "true velocity, east, m/s",
-    "vy": "true velocity, north, m/s",
-    "vz": "true velocity, up, m/s",
-    "mx": "own velocity as measured, east, m/s",
-    "my": "own velocity as measured, north, m/s",
-    "mz": "own velocity as measured, up, m/s",
+    **along_axes("v", "true velocity", "m/s"),
+    **along_axes("m", "own velocity as measured", "m/s"),
     **COMMAND,
-    "gx": "normal random number, east",
-    "gy": "normal random number, north",
-    "gz": "normal random number, up",
-    "wx": "wind, east, m/s",
-    "wy": "wind, north, m/s",
-    "wz": "wind, up, m/s",
+    **along_axes("g", "normal random number"),
+    **along_axes("w", "wind", "m/s"),
     "dt": "time step, s",
     "memory": "the body's Memory of this agent",
     "wing": "parameters of the wing (aero.wing)",

@@ -37,6 +37,12 @@ class State(NamedTuple):
     vz: float
 
 
+def along_axes(name: str, text: str, unit: str = "") -> dict[str, str]:
+    """Return the words of a vector in a vocabulary, east, north and up: "vx": "wind, east, m/s", and so on."""
+    axes = zip("xyz", ("east", "north", "up"), strict=True)
+    return {f"{name}{axis}": f"{text}, {way}{unit and f', {unit}'}" for axis, way in axes}
+
+
 def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
     """Return the names in a module, a class or a mapping, and its own name: `name`, its NAME, or that of its module.
 

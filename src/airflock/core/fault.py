@@ -13,7 +13,7 @@ from math import inf
 from typing import Any
 
 from airflock.core.body import COMMAND, MOTION, STATE
-from airflock.core.contract import argument_names, call_rule, gather, namespace_names
+from airflock.core.contract import along_axes, argument_names, call_rule, gather, namespace_names
 from airflock.core.parameters import Parameters, choices, number_names
 from airflock.support import RuleError
 
@@ -31,9 +31,7 @@ RULES = {
     "overrule": {**COMMAND, **ONSET, "f": "the fault's parameters"},
     "motion": {
         **{name: MOTION[name] for name in ("vx", "vy", "vz", "cx", "cy", "cz", "dt")},
-        "nx": "velocity after the step as the body flew it, east, m/s",
-        "ny": "velocity after the step as the body flew it, north, m/s",
-        "nz": "velocity after the step as the body flew it, up, m/s",
+        **along_axes("n", "velocity after the step as the body flew it", "m/s"),
         **ONSET,
         "f": "the fault's parameters",
     },

@@ -9,16 +9,23 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.body import STATE
-from airflock.core.contract import CLOCKS, OVER_TIME, REDUCTIONS, argument_names, call_rule, gather, namespace_names
+from airflock.core.contract import (
+    CLOCKS,
+    OVER_TIME,
+    REDUCTIONS,
+    along_axes,
+    argument_names,
+    call_rule,
+    gather,
+    namespace_names,
+)
 from airflock.core.model import FLOCK, PAIR
 from airflock.support import RuleError
 
 MEASURED = {
     **STATE,
     "speed": "length of the velocity, m/s",
-    "hx": "heading (unit vector; zero at rest), east",
-    "hy": "heading (unit vector; zero at rest), north",
-    "hz": "heading (unit vector; zero at rest), up",
+    **along_axes("h", "heading (unit vector; zero at rest)"),
     "excursion": "distance outside the arena or inside an obstacle, m; negative where flying is allowed",
     "touches": "1.0 if a sphere of radius metrics.r_body met the scene on its last step of motion, else 0.0",
     "rays": "rays that the agent cast at its last decision; 0.0 in a recording",
@@ -37,9 +44,7 @@ MEMBER = {
 }
 CLUSTER = {
     "n": "members of the cluster",
-    "hx": "sum of their headings, east",
-    "hy": "sum of their headings, north",
-    "hz": "sum of their headings, up",
+    **along_axes("h", "sum of their headings"),
     "hh": "sum of the squared lengths of their headings: how many of them move",
     "members": "what `member` summed up over the members",
     "mean": "Mean over the members",

@@ -5,29 +5,19 @@ from dataclasses import dataclass, field, replace
 from inspect import signature
 from typing import Any
 
-from airflock.core.contract import COMMANDS, REDUCTIONS, argument_names, gather, namespace_names
+from airflock.core.contract import COMMANDS, REDUCTIONS, along_axes, argument_names, gather, namespace_names
 from airflock.core.parameters import declarations
 from airflock.support import RuleError
 
 PAIR = {
-    "dx": "offset to the neighbour as heard, east, m",
-    "dy": "offset to the neighbour as heard, north, m",
-    "dz": "offset to the neighbour as heard, up, m",
+    **along_axes("d", "offset to the neighbour as heard", "m"),
     "r": "length of the offset, m",
     "r2": "its square, m²; cheaper than r",
-    "dvx": "velocity of the neighbour minus own, east, m/s",
-    "dvy": "velocity of the neighbour minus own, north, m/s",
-    "dvz": "velocity of the neighbour minus own, up, m/s",
+    **along_axes("dv", "velocity of the neighbour minus own", "m/s"),
     "dv": "length of the velocity difference, m/s",
-    "vx": "own velocity as measured, east, m/s",
-    "vy": "own velocity as measured, north, m/s",
-    "vz": "own velocity as measured, up, m/s",
-    "hx": "own heading (unit vector), east",
-    "hy": "own heading (unit vector), north",
-    "hz": "own heading (unit vector), up",
-    "nhx": "heading of the neighbour as heard, east",
-    "nhy": "heading of the neighbour as heard, north",
-    "nhz": "heading of the neighbour as heard, up",
+    **along_axes("v", "own velocity as measured", "m/s"),
+    **along_axes("h", "own heading (unit vector)"),
+    **along_axes("nh", "heading of the neighbour as heard"),
     "age": "age of the neighbour's data, s",
     "lower": "1.0 if the neighbour has the lower index, else 0.0",
     "kin": "1.0 if the neighbour is of the own group, else 0.0",
@@ -35,21 +25,15 @@ PAIR = {
 }
 SURFACE = {
     "distance": "distance to the surface, m; negative on its far side",
-    "nx": "unit normal of the surface, pointing to where flying is allowed, east",
-    "ny": "unit normal of the surface, pointing to where flying is allowed, north",
-    "nz": "unit normal of the surface, pointing to where flying is allowed, up",
-    "vx": "own velocity as measured, east, m/s",
-    "vy": "own velocity as measured, north, m/s",
-    "vz": "own velocity as measured, up, m/s",
+    **along_axes("n", "unit normal of the surface, pointing to where flying is allowed"),
+    **along_axes("v", "own velocity as measured", "m/s"),
 }
 FLOCK = {
     "n": "number of agents",
     "x": "true positions of all agents, east, m; x[i] is that of agent i",
     "y": "true positions of all agents, north, m; y[i] is that of agent i",
     "z": "true positions of all agents, up, m; z[i] is that of agent i",
-    "vx": "their velocities, east, m/s",
-    "vy": "their velocities, north, m/s",
-    "vz": "their velocities, up, m/s",
+    **along_axes("v", "their velocities", "m/s"),
     "wing": "parameters of the wing (aero.wing)",
     "aero": "parameters of the drag descent (aero.descent)",
     "work": "scratch arrays in the shapes that `workspace` gives, kept from call to call; work.name[row][column]",

@@ -13,6 +13,7 @@ from typing import Any
 
 from airflock.core import random
 from airflock.core.contract import (
+    along_axes,
     argument_names,
     call_rule,
     check_memory_record,
@@ -42,40 +43,24 @@ MISSED = {
 }
 RECEIVED = {
     **PACKET,
-    "dx": "true offset from the receiver to the sender, east, m",
-    "dy": "true offset from the receiver to the sender, north, m",
-    "dz": "true offset from the receiver to the sender, up, m",
-    "vx": "true velocity of the receiver, east, m/s",
-    "vy": "true velocity of the receiver, north, m/s",
-    "vz": "true velocity of the receiver, up, m/s",
+    **along_axes("d", "true offset from the receiver to the sender", "m"),
+    **along_axes("v", "true velocity of the receiver", "m/s"),
     "age": "age of the newest packet that the receiver has of the sender, s; 1e9 or more before the first",
     "packet": "the radio's Packet of this pair",
     **CHANCES,
 }
 SEEN = {
-    "dx": "true offset to the other one when the picture was taken, radio.delay ago, east, m",
-    "dy": "true offset to the other one when the picture was taken, radio.delay ago, north, m",
-    "dz": "true offset to the other one when the picture was taken, radio.delay ago, up, m",
-    "ex": "offset at which the newest estimate, carried forward, expects it in that picture, east, m",
-    "ey": "offset at which the newest estimate, carried forward, expects it in that picture, north, m",
-    "ez": "offset at which the newest estimate, carried forward, expects it in that picture, up, m",
-    "evx": "its velocity by the newest estimate, east, m/s",
-    "evy": "its velocity by the newest estimate, north, m/s",
-    "evz": "its velocity by the newest estimate, up, m/s",
-    "vx": "own velocity as measured, east, m/s",
-    "vy": "own velocity as measured, north, m/s",
-    "vz": "own velocity as measured, up, m/s",
+    **along_axes("d", "true offset to the other one when the picture was taken, radio.delay ago", "m"),
+    **along_axes("e", "offset at which the newest estimate, carried forward, expects it in that picture", "m"),
+    **along_axes("ev", "its velocity by the newest estimate", "m/s"),
+    **along_axes("v", "own velocity as measured", "m/s"),
     "since": "time since the last picture in which it was found, s; about 1e9 before the first",
     "period": "time between two decisions, s",
     **CHANCES,
 }
 CARRIED = {
-    "x": "position in the newest packet, east, m",
-    "y": "position in the newest packet, north, m",
-    "z": "position in the newest packet, up, m",
-    "vx": "velocity in the newest packet, east, m/s",
-    "vy": "velocity in the newest packet, north, m/s",
-    "vz": "velocity in the newest packet, up, m/s",
+    **along_axes("", "position in the newest packet", "m"),
+    **along_axes("v", "velocity in the newest packet", "m/s"),
     "age": "age of the newest packet, s",
 }
 RULES = {

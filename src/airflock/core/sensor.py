@@ -12,6 +12,7 @@ from typing import Any
 from airflock.core import random
 from airflock.core.contract import (
     State,
+    along_axes,
     argument_names,
     call_rule,
     check_memory_record,
@@ -24,12 +25,8 @@ from airflock.core.parameters import Parameters, quantity
 from airflock.support import RuleError
 
 SENSED = {
-    "x": "true position, east, m",
-    "y": "true position, north, m",
-    "z": "true position, up, m",
-    "vx": "true velocity, east, m/s",
-    "vy": "true velocity, north, m/s",
-    "vz": "true velocity, up, m/s",
+    **along_axes("", "true position", "m"),
+    **along_axes("v", "true velocity", "m/s"),
     "memory": "the sensor's Memory of this agent",
     **{f"g{k}": "normal random number, new at each measurement" for k in range(12)},
     **{f"u{k}": "uniform random number between 0 and 1, new at each measurement" for k in range(4)},

@@ -21,14 +21,16 @@ from .optimisers import (
     binary_genetic as binary_genetic,
     decode as decode,
 )
-from .search_settings import SearchSettings as SearchSettings
-from .study import load_study as load_study
+from .study import (
+    SearchSettings as SearchSettings,
+    load_study as load_study,
+    shipped_study_axes as shipped_study_axes,
+)
 from .study_result import (
     BEST_FILE as BEST_FILE,
     EvolveResult as EvolveResult,
     further_best_files as further_best_files,
 )
-from .study_space import shipped_study_axes as shipped_study_axes
 from .tuning_run import (
     load_plan as load_plan,
     make_request as make_request,

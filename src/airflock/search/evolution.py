@@ -37,11 +37,16 @@ from airflock.runs import (
     write_toml_file,
 )
 from airflock.scenarios import Scenario, load, scenario_variant
-from airflock.search.finals import conclude_study
-from airflock.search.generations import Evaluator, run_search
+from airflock.search.generations import Evaluator, conclude_study, run_search
 from airflock.search.objectives import Objective, UserFitness
-from airflock.search.search_settings import fast_search_keys as fast_keys
-from airflock.search.study import Study, is_study, load_study, make_study, study_of_request
+from airflock.search.study import (
+    Study,
+    fast_search_keys as fast_keys,
+    is_study,
+    load_study,
+    make_study,
+    study_of_request,
+)
 from airflock.search.study_result import EvolveResult, draw_study, export
 from airflock.support import AirflockError, ErrorCollector, StudyError, as_error, atomic
 

@@ -41,7 +41,7 @@ from airflock.scenarios import Scenario, check_seeds, formats, load_if_named, re
 from airflock.search.generations import ZERO_FITNESS, zero_fitness_reason
 from airflock.search.limit_excess import allowed_probability, limit_excess
 from airflock.search.objectives import read_limits
-from airflock.search.search_settings import SearchSettings
+from airflock.search.study import SearchSettings
 from airflock.search.study_result import mean_interval
 from airflock.support import ErrorCollector, ScenarioError
 

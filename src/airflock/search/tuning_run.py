@@ -48,9 +48,8 @@ from airflock.scenarios import Scenario, build_scenario, formats, load, rebuilt,
 from airflock.search.evolution import run_study, study_executor
 from airflock.search.hardening import MAX_ROUNDS, StepResult, harden, hardened_document
 from airflock.search.limit_excess import flights_per_event, limit_report_line
-from airflock.search.study import make_study
+from airflock.search.study import default_space, make_study
 from airflock.search.study_result import BEST_FILE, EvolveResult
-from airflock.search.study_space import default_space
 from airflock.support import (
     ErrorCollector,
     RecordingError,
