@@ -139,16 +139,15 @@ def check_run_time(scenario: Scenario) -> None:
     if took <= LONGEST:
         return
     days = LONGEST / 86400.0
-    fit = largest_fitting(scenario.agents, lambda agents: estimated_seconds(_with_agents(scenario, agents)) <= LONGEST)
+
+    def fits_with(agents: int) -> bool:
+        return estimated_seconds(replace(scenario, flight=replace(flight, agents=float(agents)))) <= LONGEST
+
+    fit = largest_fitting(scenario.agents, fits_with)
     message = f"{scenario.name}: a flight takes about {took / 86400.0:.3g} days of a processor, more than {days:g}"
     fits = [f"about {fit} agents fit"] if fit else []
     fits.append(f"{'or ' if fits else ''}a duration of about {flight.duration * LONGEST / took:.3g} s")
     raise FlightError(f"{message}; {'; '.join(fits)}, or a longer dt = {flight.dt:g} s")
-
-
-def _with_agents(scenario: Scenario, agents: float) -> Scenario:
-    """Return the scenario with another number of agents."""
-    return replace(scenario, flight=replace(scenario.flight, agents=float(agents)))
 
 
 def estimated_seconds(scenario: Scenario) -> float:

@@ -80,10 +80,13 @@ def to_vector(name: str, value: Any, dimensions: int, unit: str) -> list[float]:
 
 def check_agent(agent: Any, agents: int) -> int:
     """Return the number of an agent of the flock. Raises FlightError in one line."""
-    # __index__ and not int(): 1.5 or "3" would pass as another agent.
-    if isinstance(agent, bool) or not hasattr(agent, "__index__") or not 0 <= _index(agent) < agents:
+    try:  # not int(): 1.5 or "3" would pass as another agent
+        number = -1 if isinstance(agent, bool) else operator.index(agent)
+    except TypeError:
+        number = -1
+    if not 0 <= number < agents:
         raise FlightError(f"agent = {agent!r}: this flight has the agents 0 to {agents - 1}")
-    return _index(agent)
+    return number
 
 
 def are_several(agents: Any) -> bool:
@@ -106,14 +109,6 @@ def check_agents(number_or_list: Any, agents: int) -> list[int]:
         twice = next(number for place, number in enumerate(numbers) if number in numbers[:place])
         raise FlightError(f"agent = {number_or_list!r}: {twice} is named twice")
     return numbers
-
-
-def _index(given: Any) -> int:
-    """Return a whole number, -1 where an array of several stands for one."""
-    try:
-        return int(given)
-    except TypeError:
-        return -1
 
 
 LARGEST_SEED = 2**64 - 1

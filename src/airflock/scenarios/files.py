@@ -1,7 +1,7 @@
 """Scenario files: TOML with units and sources, presets by name, files that extend others, fields from map files."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import resources
@@ -145,7 +145,7 @@ def load(
     where = text if text in presets() else str(expand_path(text))
     with as_error(where):
         document, folder = _read(where, None)
-        document, base = extend_document(document, where, folder, _read)
+        document, base = extend_document(document, where, folder)
         document, caller_parts = _with_given(
             document, zip(PART_KINDS, (metrics, body, sensor, radio, topology), strict=True)
         )
@@ -290,11 +290,10 @@ LONGEST = 10  # files in a chain of extends
 # sections in which another kind means other keys
 SECTIONS_WITH_KINDS = ("model", "body", "sensors", "radio", "scene", "goals", "start")
 SHARED_KEYS = {"sensors": ("period",), "radio": number_names(PacketParameters)}  # but for these, which every kind has
-ReadDocument = Callable[[str, Path | None], tuple[dict[str, Any], Path]]
 
 
 def extend_document(
-    document: Mapping[str, Any], where: str, folder: Path | None, read: ReadDocument
+    document: Mapping[str, Any], where: str, folder: Path | None, chain: tuple[str, ...] = ()
 ) -> tuple[dict[str, Any], str]:
     """Merge a document over the file that it extends; return it, and the name of that file ("" for none).
 
@@ -303,15 +302,9 @@ def extend_document(
     the published values of the file, nor its title.
 
     where  : name of the document, for errors
-    folder : where files are looked for
-    read   : name of a preset or file, folder → its document and its folder; raises ScenarioError
+    folder : where files are looked for; chain : names of the documents that extend this one
     """
-    return _extended(document, where, folder, read, (where,))
-
-
-def _extended(
-    document: Mapping[str, Any], where: str, folder: Path | None, read: ReadDocument, chain: tuple[str, ...]
-) -> tuple[dict[str, Any], str]:
+    chain = (*chain, where)
     # The keys are copied and the link is gone: a recording must not change when a preset does.
     own = dict(document)
     name = own.pop("extends", None)
@@ -322,11 +315,11 @@ def _extended(
     if name in chain or len(chain) > LONGEST:
         raise ScenarioError([f"{where}: extends = {name!r} leads back to itself: {' → '.join((*chain, name))}"])
     try:
-        base, place = read(name, folder)
+        base, place = _read(name, folder)
     except ScenarioError as error:
         raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in error.errors]) from error
     # The base's own files are named relative to the base, so they become absolute before the merge.
-    base, _ = _extended(_with_paths(base, place), name, place, read, (*chain, name))
+    base, _ = extend_document(_with_paths(base, place), name, place, chain)
     for key in OF_ITS_OWN:
         base.pop(key, None)
     return {**base, **{key: _merge_section(key, base.get(key), value) for key, value in own.items()}}, name
@@ -348,33 +341,30 @@ def _merge_section(key: str, base: Any, own: Any) -> Any:
 def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return a document in which relative files of rules or meshes have absolute paths."""
     result = dict(document)
-    kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "topology", "metrics")]
     # Relative names are relative to the file that has them, which is lost when documents are
     # merged.
-    for section, key in (*kinds, ("scene", "file")):
-        table = result.get(section)
-        name = value_of(table.get(key)) if isinstance(table, Mapping) else None
-        if isinstance(name, str) and name and not expand_path(name).is_absolute() and is_file(folder / name):
-            result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
-    faults, groups = result.get("faults"), result.get("groups")
-    if isinstance(faults, list):
-        result["faults"] = [_kind_with_path(entry, folder) for entry in faults]
-    if isinstance(groups, list):
-        result["groups"] = [_group_with_path(entry, folder) for entry in groups]
+    for section in ("model", "body", "sensors", "radio", "topology", "metrics", "scene"):
+        if section in result:
+            result[section] = _with_path(result[section], folder, "file" if section == "scene" else "kind")
+    if isinstance(faults := result.get("faults"), list):
+        result["faults"] = [_with_path(entry, folder) for entry in faults]
+    if isinstance(groups := result.get("groups"), list):
+        result["groups"] = [
+            {**entry, "model": _with_path(entry["model"], folder)}
+            if isinstance(entry, Mapping) and "model" in entry
+            else entry
+            for entry in groups
+        ]
     return result
 
 
-def _group_with_path(entry: Any, folder: Path) -> Any:
-    if not isinstance(entry, Mapping) or "model" not in entry:
-        return entry
-    return {**entry, "model": _kind_with_path(entry["model"], folder)}
-
-
-def _kind_with_path(entry: Any, folder: Path) -> Any:
-    name = entry.get("kind") if isinstance(entry, Mapping) else None
-    if not isinstance(name, str) or not name.endswith(".py") or Path(name).is_absolute() or not is_file(folder / name):
-        return entry
-    return {**entry, "kind": str((folder / name).absolute())}
+def _with_path(table: Any, folder: Path, key: str = "kind") -> Any:
+    """Return a table in which the file of code or the mesh of a key has its absolute path."""
+    name = value_of(table.get(key)) if isinstance(table, Mapping) else None
+    if not isinstance(name, str) or not name or not (key == "file" or name.endswith(".py")):
+        return table
+    is_beside = not expand_path(name).is_absolute() and is_file(folder / name)
+    return {**table, key: str((folder / name).absolute())} if is_beside else table
 
 
 FROM_FILE = ("world.file", "world.simplify")

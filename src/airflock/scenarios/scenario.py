@@ -33,7 +33,7 @@ from airflock.parts.metrics import parameters as metric_parameters
 from airflock.scenarios.fault_entries import FaultEntry
 from airflock.scenarios.groups import FlownLaw, Group, agent_values, flown_laws, varied_numbers
 from airflock.scenarios.scenario_checks import largest_extension
-from airflock.scenarios.sections import ORDER, SECTIONS, Flight
+from airflock.scenarios.sections import ORDER, Flight
 from airflock.world import Scene, arena, goals, scene_of, scenery, start, waypoints
 
 Rule = TypeVar("Rule")
@@ -110,7 +110,20 @@ class Scenario:
 
     def _repr_html_(self) -> str:
         """Return tables of all keys that differ from their defaults, for a notebook."""
-        return scenario_html(self)
+        rows = []
+        for section, record in {"": self.flight, "model": self.parameters, **self.records}.items():
+            for name, declared, default in declarations(record):
+                if (value := getattr(record, name)) == default:
+                    continue
+                text = str(value)
+                if isinstance(declared, Quantity):
+                    text = format_with_unit(f"{value:g}", declared.unit)
+                elif isinstance(value, tuple) and len(value) > SHOWN:
+                    text = f"{len(value)} entries"
+                rows.append((f"{section}.{name}".lstrip("."), text, declared.meaning))
+        notes = "".join(f"<li>{escape(note)}</li>" for note in self.notes)
+        keys = html_table(("changed key", "value", "meaning"), rows)
+        return f"<p><b>{escape(summary(self))}</b></p>{keys}{f'<ul>{notes}</ul>' if notes else ''}"
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: cached properties are derived again after unpickling."""
@@ -398,23 +411,6 @@ def summary(scenario: Scenario) -> str:
     )
 
 
-def changed_values(record: object) -> list[tuple[str, str, str]]:
-    """Return key, value with unit, and meaning of each number that differs from its default."""
-    rows = []
-    for name, declared, default in declarations(record):
-        value = getattr(record, name)
-        if value == default:
-            continue
-        if isinstance(declared, Quantity):
-            text = format_with_unit(f"{value:g}", declared.unit)
-        elif isinstance(value, tuple):
-            text = str(value) if len(value) <= SHOWN else f"{len(value)} entries"
-        else:
-            text = str(value)
-        rows.append((name, text, declared.meaning))
-    return rows
-
-
 def format_number(value: float) -> str:
     """Format a number with four digits, as tables show it."""
     return f"{value:.4g}"
@@ -425,20 +421,6 @@ def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
     body = "".join(f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def scenario_html(scenario: Scenario) -> str:
-    """Return a table of everything that differs from the defaults, and the notes."""
-    records = {"top": scenario.flight, "model": scenario.parameters}
-    records |= {name: scenario.records[name] for name in ("body", *(name for name in SECTIONS if name != "body"))}
-    rows = [
-        (name if section == "top" else f"{section}.{name}", value, meaning)
-        for section, record in records.items()
-        for name, value, meaning in changed_values(record)
-    ]
-    notes = "".join(f"<li>{escape(note)}</li>" for note in scenario.notes)
-    keys = html_table(("changed key", "value", "meaning"), rows)
-    return f"<p><b>{escape(summary(scenario))}</b></p>{keys}{f'<ul>{notes}</ul>' if notes else ''}"
 
 
 def default_separation(model: Model, parameters: Any, start_record: start.Parameters, world: arena.Parameters) -> float:

@@ -272,11 +272,22 @@ class Study:
     kind = "study"
 
     def __repr__(self) -> str:
-        return f"<{study_summary(self)}>"
+        return f"<{self._summary}>"
+
+    @property
+    def _summary(self) -> str:
+        """Goals and flights in one sentence."""
+        q, goals = self.search, ", ".join(objective.name for objective in self.objectives)
+        return (
+            f"Study of {', '.join(s.name for s in self.scenarios)}: {len(self.space.axes)} parameters for {goals}, "
+            f"{q.generations:g} generations of {q.population:g} candidates, {q.seeds:g} flight"
+            f"{'s' * (q.seeds > 1)} each"
+        )
 
     def _repr_html_(self) -> str:
         """Return a table of the varied parameters, for a notebook."""
-        return study_html(self)
+        rows = [(a.key, f"{a.low:g} … {a.high:g}", a.unit, a.scale) for a in self.space.axes]
+        return f"<p><b>{escape(self._summary)}</b></p>{html_table(('parameter', 'range', 'unit', 'scale'), rows)}"
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
@@ -605,21 +616,6 @@ def joint_errors(
         keys = () if space is None else (*space.keys, *space.fixed, *space.tied)
         errors += [f"space.{key}: {label} has no such number" for key in keys if key not in known]
     return errors
-
-
-def study_summary(study: Study) -> str:
-    """Summarise a study in one sentence: its goals and its flights."""
-    q, goals = study.search, ", ".join(objective.name for objective in study.objectives)
-    return (
-        f"Study of {', '.join(s.name for s in study.scenarios)}: {len(study.space.axes)} parameters for {goals}, "
-        f"{q.generations:g} generations of {q.population:g} candidates, {q.seeds:g} flight{'s' * (q.seeds > 1)} each"
-    )
-
-
-def study_html(study: Study) -> str:
-    """Return a table of the varied parameters as HTML."""
-    rows = [(a.key, f"{a.low:g} … {a.high:g}", a.unit, a.scale) for a in study.space.axes]
-    return f"<p><b>{escape(study_summary(study))}</b></p>{html_table(('parameter', 'range', 'unit', 'scale'), rows)}"
 
 
 ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "factor", "offset", "source", "note")

@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from airflock.core import Quantity, declarations
-from airflock.runs import FlightStore, parse_values, to_toml_values
+from airflock.runs import FlightStore, declared_numbers, parse_values, to_toml_values
 from airflock.scenarios import Scenario, format_number, formats, html_table
 from airflock.search.limit_excess import limit_report_line
 from airflock.search.optimisers import pareto_front
@@ -70,11 +69,26 @@ class EvolveResult:
     reasons: Mapping[str, int] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        return f"<{result_summary(self)}>"
+        return f"<{self._summary}>"
+
+    @property
+    def _summary(self) -> str:
+        """The winner's fitness on fresh seeds in one sentence."""
+        if self.dead_reason:
+            return f"Result {self.folder}: nothing flies: {self.dead_reason}"
+        span = f"{self.fitness:.3g} (95 %: {self.low:.3g} to {self.high:.3g}) on {self.seeds} fresh seeds"
+        return f"Result {self.folder}: {self.scenario.name}, fitness {span}"
 
     def _repr_html_(self) -> str:
         """A table of the winner's parameters, for a notebook."""
-        return result_html(self)
+        known = declared_numbers(self.scenario)
+        rows = [
+            (key, format_number(value), known[key][0].unit if key in known else "",
+             " … ".join(map(format_number, self.ranges.get(key, ()))))
+            for key, value in self.parameters.items()
+        ]  # fmt: skip
+        heads = ("parameter", "winner", "unit", "candidates as good")
+        return f"<p><b>{escape(self._summary)}</b></p>{html_table(heads, rows)}"
 
     def __rich__(self) -> Any:
         """Return the winner's parameters and what its flights say, for a terminal."""
@@ -105,6 +119,10 @@ class EvolveResult:
         >>> airflock.evolve(short, "study", space=vary, **few).document()["fitness"]["seeds"]
         2
         """
+        several = [
+            {"scenario": name, "mean": mean, "low": low, "high": high}
+            for name, (mean, low, high) in self.scenarios.items()
+        ]
         return {
             "scenario": self.scenario.name,
             "fitness": {
@@ -119,7 +137,7 @@ class EvolveResult:
             **({"dead": self.dead_reason} if self.dead_reason else {}),
             "parameters": self.parameters,
             **({"limits": [dict(entry) for entry in self.limits]} if self.limits else {}),
-            **({"scenarios": [_told(name, *span) for name, span in self.scenarios.items()]} if self.scenarios else {}),
+            **({"scenarios": several} if several else {}),
             "working_ranges": {
                 "candidates": self.candidate_count,
                 "failed": self.failed,
@@ -128,10 +146,6 @@ class EvolveResult:
                 "range": {key: list(span) for key, span in self.ranges.items()},
             },
         }
-
-
-def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
-    return {"scenario": name, "mean": mean, "low": low, "high": high}
 
 
 def best_files(study: Study) -> list[str]:
@@ -171,41 +185,16 @@ def best_document(
     return dict(document)
 
 
-def result_summary(result: EvolveResult) -> str:
-    """Summarise a result in one sentence: the winner's fitness on fresh seeds."""
-    if result.dead_reason:
-        return f"Result {result.folder}: nothing flies: {result.dead_reason}"
-    span = f"{result.fitness:.3g} (95 %: {result.low:.3g} to {result.high:.3g}) on {result.seeds} fresh seeds"
-    return f"Result {result.folder}: {result.scenario.name}, fitness {span}"
-
-
-def result_html(result: EvolveResult) -> str:
-    """Return a table of the winner's parameters and working ranges as HTML."""
-    units = {
-        f"{section}.{name}".lstrip("."): declared.unit
-        for section, record in result.scenario.records.items()
-        for name, declared, _ in declarations(record)
-        if isinstance(declared, Quantity)
-    }
-    rows = [
-        (key, format_number(value), units.get(key, ""), " … ".join(map(format_number, result.ranges.get(key, ()))))
-        for key, value in result.parameters.items()
-    ]
-    heads = ("parameter", "winner", "unit", "candidates as good")
-    return f"<p><b>{escape(result_summary(result))}</b></p>{html_table(heads, rows)}"
-
-
 DURATION_COLUMN = "duration"  # key of the scenario that short flights set, column of their table
 FLOWN = "duration_flown"  # that column beside `duration`, the time that a flight took
 KEY = ["stage", "run", "generation", "candidate"]
 
 
-def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = "search") -> pd.DataFrame:
-    """Return one row a candidate: its parameters by key, then its fitness by objective; nan: failed."""
+def candidate_table(store: FlightStore, objectives: Sequence[str]) -> pd.DataFrame:
+    """Return one row a candidate of the search: its parameters by key, then its fitness by objective; nan: failed."""
     rows = store.rows(
-        "SELECT run, generation, candidate, parameters, fitness FROM candidate WHERE stage=? AND fitness IS NOT NULL "
-        "ORDER BY run, generation, candidate",
-        (stage,),
+        "SELECT run, generation, candidate, parameters, fitness FROM candidate WHERE stage='search' "
+        "AND fitness IS NOT NULL ORDER BY run, generation, candidate"
     )
     found = []
     for run, generation, candidate, parameters, fitness in rows:
@@ -217,7 +206,7 @@ def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = 
     return pd.DataFrame(found)
 
 
-def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
+def flight_table(store: FlightStore) -> pd.DataFrame:
     """Return one row a flight: parameters, seed, order parameters, why it failed, duration (s), worker, versions.
 
     A flight of another length than the scenario's has it as `duration_flown` (s, simulated).
@@ -225,9 +214,7 @@ def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
     rows = store.rows(
         "SELECT f.stage, f.run, f.generation, f.candidate, f.repeat, f.seed, c.parameters, f.scores, f.reason, "
         "f.duration, f.worker, s.versions FROM flight f JOIN candidate c USING (stage, run, generation, candidate) "
-        "LEFT JOIN session s USING (session) WHERE ? IS NULL OR f.stage=? "
-        "ORDER BY f.stage, f.run, f.generation, f.candidate, f.repeat",
-        (stage, stage),
+        "LEFT JOIN session s USING (session) ORDER BY f.stage, f.run, f.generation, f.candidate, f.repeat"
     )
     found = []
     for *key, parameters, scores, reason, duration, worker, versions in rows:
