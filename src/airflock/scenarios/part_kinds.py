@@ -7,19 +7,16 @@ consent to run it.
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from airflock.core import (
-    Body,
     Fault,
     Kind,
-    MetricSet,
     Model,
     PacketParameters,
     Radio,
-    Sensor,
     Topology,
     add_laws,
     composition_errors,
@@ -83,20 +80,26 @@ def kept_keys(kind: Kind[Any], table: Mapping[str, Any], new: str) -> dict[str, 
 
 @dataclass(frozen=True)
 class CallerParts:
-    """The parts that a caller gives in place of those that a document names; None and empty where it gives nothing.
+    """The parts of a scenario that a caller gives in place of those of its document; `collect_parts` finds the others.
 
     topology : a topology that is not of the package
     fault_kinds : kinds of fault that [[faults]] may name; laws : laws that [[groups]] may name
     """
 
     law: Model | None = None
-    body: Body | None = None
-    metrics: MetricSet | None = None
-    sensors: Sensor | None = None
-    radio: Radio | None = None
+    body: Any = None  # a Body, MetricSet, Sensor and Radio; None until they are collected
+    metrics: Any = None
+    sensors: Any = None
+    radio: Any = None
     topology: Topology | None = None
     fault_kinds: Mapping[str, Fault] = field(default_factory=dict)
     laws: Mapping[str, Model] = field(default_factory=dict)
+
+    @property
+    def records(self) -> dict[str, type]:
+        """Section → the record of parameters that checks it, without the law's."""
+        own = {kind.section: getattr(self, kind.section) for kind in PART_KINDS}
+        return SECTIONS | {section: part.Parameters for section, part in own.items() if part and part.Parameters}
 
 
 NO_CALLER_PARTS = CallerParts()
@@ -126,30 +129,9 @@ def drag_descent_errors(model: Model) -> list[str]:
     return [f"aero: {error}" for error in composition_errors(model, DESCENT)]
 
 
-class ScenarioParts(NamedTuple):
-    """The parts that fly a scenario; law is None where it is missing, topology where it is one of the package."""
-
-    law: Model | None
-    body: Body
-    metrics: MetricSet
-    sensors: Sensor
-    radio: Radio
-    topology: Topology | None
-
-    @property
-    def records(self) -> dict[str, type]:
-        """Section → the record of parameters that checks it, without the law's."""
-        own = {
-            "body": self.body.Parameters, "sensors": self.sensors.Parameters, "radio": self.radio.Parameters,
-            "metrics": self.metrics.Parameters,
-        }  # fmt: skip
-        topology = self.topology.Parameters if self.topology else None
-        return SECTIONS | own | ({"topology": topology} if topology else {})
-
-
 def collect_parts(
     document: dict[str, Any], caller_parts: CallerParts, folder: Path | None, errors: ErrorCollector, *, trust: bool
-) -> tuple[ScenarioParts, dict[str, Any]]:
+) -> tuple[CallerParts, dict[str, Any]]:
     """Find all parts that a document names.
 
     Parameters
@@ -160,7 +142,7 @@ def collect_parts(
 
     Returns
     -------
-    The parts, with a stand-in for each missing one; the document without numbers that no stand-in knows.
+    All parts, with a stand-in for each missing one; the document without numbers that no stand-in knows.
     """
     missing: list[str] = []
 
@@ -202,7 +184,9 @@ def collect_parts(
         topology = part_by_name(TOPOLOGIES, name, errors, folder, trust=trust)
         if topology is INVALID:
             topology, document = None, {**document, "topology": {}}
-    parts = ScenarioParts(law, body, metrics, sensors, transmission, topology)
+    parts = replace(
+        caller_parts, law=law, body=body, metrics=metrics, sensors=sensors, radio=transmission, topology=topology
+    )
     # A stand-in knows other numbers than the part that is missing, so only the numbers of both are
     # checked.
     for section in missing:

@@ -23,7 +23,6 @@ from airflock.scenarios.part_kinds import (
     NO_CALLER_PARTS,
     PART_KINDS,
     CallerParts,
-    ScenarioParts,
     collect_parts,
 )
 from airflock.scenarios.scenario import Part, Scenario, default_separation
@@ -97,7 +96,7 @@ def build_scenario(
     whole = apply_settings(whole, named, errors)
     parts = _read_sections(whole, flown, records, errors)
     errors.add(*_errors_between(parts, flown, started))
-    individuals = _read_groups_and_faults(whole, parts, flown, caller_parts, folder, errors, trust)
+    individuals = _read_groups_and_faults(whole, parts, flown, folder, errors, trust)
     published = _published(whole.get("published", {}), errors)
     errors.raise_errors(where)
     assert flown.law is not None, "a missing law is an error"
@@ -120,7 +119,7 @@ MOST_CORNERS = 10_000  # of all polygons of a world: each is looked at in each d
 
 
 def _read_sections(
-    document: dict[str, Any], flown: ScenarioParts, records: Mapping[str, type], errors: ErrorCollector
+    document: dict[str, Any], flown: CallerParts, records: Mapping[str, type], errors: ErrorCollector
 ) -> dict[str, Any]:
     """Make the records of a scenario by field, None where one has an error; the document gets declared units."""
     kinds = {kind.section: kind for kind in PART_KINDS if kind is not SETS}
@@ -152,8 +151,7 @@ def _derived_errors(scenario: Scenario) -> list[str]:
 def _read_groups_and_faults(
     document: Mapping[str, Any],
     parts: Mapping[str, Any],
-    flown: ScenarioParts,
-    given: CallerParts,
+    flown: CallerParts,
     folder: Path | None,
     errors: ErrorCollector,
     trust: bool,
@@ -169,7 +167,7 @@ def _read_groups_and_faults(
     if law is not None and parts.get("parameters") is not None:
         kind, world = document.get("model", {}).get("kind"), parts["world"]
         walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
-        named = GroupLawReader(law, kind, parts["parameters"], given.laws, folder, trust, walls)
+        named = GroupLawReader(law, kind, parts["parameters"], flown.laws, folder, trust, walls)
     count = int(flight.agents)
     of_groups = ErrorCollector()
     flocks = read_groups(document.get("groups", ()), count, records, of_groups, named)
@@ -178,7 +176,7 @@ def _read_groups_and_faults(
         of_groups.add(*group_errors(flocks, parts, law, flown.body, flown.sensors))
     errors.merge(of_groups)
     entries = read_fault_entries(
-        document.get("faults", ()), flight, flocks, errors, folder, user_kinds=given.fault_kinds, trust=trust
+        document.get("faults", ()), flight, flocks, errors, folder, user_kinds=flown.fault_kinds, trust=trust
     )
     return {"groups": flocks, "faults": entries}
 
@@ -190,7 +188,7 @@ def _find_mesh(scene: Any, folder: Path | None) -> Any:
     return replace(scene, file=str(folder / scene.file))
 
 
-def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
+def _errors_between(parts: Mapping[str, Any], flown: CallerParts, started: bool) -> list[str]:
     """Return the errors of sections that are valid alone but do not fit each other."""
     errors: list[str] = []
     flight, law, world = parts["flight"], flown.law, parts["world"]

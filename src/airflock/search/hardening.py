@@ -34,15 +34,14 @@ from airflock.runs import (
     open_folder,
     open_run,
     run_folder,
-    to_toml_values,
     unpublished,
 )
-from airflock.scenarios import Scenario, check_seeds, formats, load_if_named, rebuilt
+from airflock.scenarios import Scenario, check_seeds, load_if_named, rebuilt
 from airflock.search.generations import ZERO_FITNESS, zero_fitness_reason
 from airflock.search.limit_excess import allowed_probability, limit_excess
 from airflock.search.objectives import read_limits
 from airflock.search.study import SearchSettings
-from airflock.search.study_result import mean_interval
+from airflock.search.study_result import document_with_numbers, mean_interval
 from airflock.support import ErrorCollector, ScenarioError
 
 ScoreColumns = Mapping[str, NDArray[np.float64]]  # score → its values (seed,)
@@ -118,12 +117,8 @@ def recipe_parameters(
     keys = {key for step in (*steps, *TABLE_S4_STEPS) for key in step.factors} | {"model.r0_shill"}
     missing = sorted(key for key in keys if key not in known)
     if missing:
-        raise ScenarioError(
-            [
-                f"{scenario.name}: no recipe for model {scenario.model.name}: {key} is not a number of it"
-                for key in missing
-            ]
-        )
+        where = f"{scenario.name}: no recipe for model {scenario.model.name}"
+        raise ScenarioError([f"{where}: {key} is not a number of it" for key in missing])
     now = {key: float(known[key][1] or 0.0) for key in sorted(keys)}
     found = [(HardeningStep("optimum", {}, "where hardening begins"), dict(now))]
     for step in steps:
@@ -248,15 +243,9 @@ class Constraints:
     limits: Sequence[EventLimit]
     cost: float
 
-    @property
-    def wall_limits(self) -> list[EventLimit]:
-        """Limits of contacts with walls and obstacles."""
-        return [limit for limit in self.limits if limit.score in WALLS]
-
-    @property
-    def other_limits(self) -> list[EventLimit]:
-        """All other limits."""
-        return [limit for limit in self.limits if limit.score not in WALLS]
+    def limits_of(self, *, walls: bool) -> list[EventLimit]:
+        """Return the limits of contacts with walls and obstacles, or all others."""
+        return [limit for limit in self.limits if (limit.score in WALLS) is walls]
 
     def refused(
         self, scenarios: Sequence[Scenario], before: Sequence[ScoreColumns], after: Sequence[ScoreColumns]
@@ -377,23 +366,20 @@ class HardeningCandidate:
         self.kept, self.seen = [optimum], [optimum[1]]
         for scenario, table in zip(self.scenarios, self.optimum, strict=True):
             if float(table["fitness"].max()) < ZERO_FITNESS:
-                columns = {name: values.tolist() for name, values in table.items()}
-                rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-                raise ScenarioError(
-                    [f"{scenario.name}: does not fly, so it cannot be hardened{zero_fitness_reason(rows)}"]
-                )
+                why = zero_fitness_reason(table_rows(table))
+                raise ScenarioError([f"{scenario.name}: does not fly, so it cannot be hardened{why}"])
         self.first = compare_with_optimum(join_scenarios(self.optimum), join_scenarios(self.optimum), *optimum)
 
     def touches(self) -> bool:
         """Return True if the kept set touches walls or obstacles in a flight, or more often than a limit allows."""
         seen = any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
-        return seen or scenarios_excess(self.constraints.wall_limits, self.scenarios, self.table) > 0.0
+        return seen or scenarios_excess(self.constraints.limits_of(walls=True), self.scenarios, self.table) > 0.0
 
     def is_short_at_walls(self) -> bool:
         """Return True if the limits of walls and obstacles are farther from being kept than the others."""
         walls, others = (
             scenarios_excess(limits, self.scenarios, self.table)
-            for limits in (self.constraints.wall_limits, self.constraints.other_limits)
+            for limits in (self.constraints.limits_of(walls=True), self.constraints.limits_of(walls=False))
         )
         return walls > others
 
@@ -448,7 +434,7 @@ class HardeningCandidate:
         """Measure what programs on board would gain for the kept set, if agents come too near."""
         now, parameters = self.table or self._fly(self.kept[-1][1], self.seeds), self.kept[-1][1]
         before = join_scenarios(now)
-        near = scenarios_excess(self.constraints.other_limits, self.scenarios, now) > 0.0
+        near = scenarios_excess(self.constraints.limits_of(walls=False), self.scenarios, now) > 0.0
         if not (before["n_coll"] > 0.0).any() and not near:
             return []
         found = []
@@ -605,14 +591,11 @@ def hardening_request(scenarios: Sequence[Scenario], cost: float, limit: str | S
 
 def hardened_document(scenario: Scenario, step: StepResult) -> dict[str, Any]:
     """Return a scenario file with the parameters of a step, each with its reason."""
-    found: dict[str, Any] = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
-    found.pop("published", None)
     known = declared_numbers(scenario)
-    for key, value in step.parameters.items():
-        if value == known[key][1]:
-            continue
-        section, _, name = key.rpartition(".")
-        entry = {"value": value, "unit": known[key][0].unit, "source": f"hardened from {known[key][1]:g}"}
-        (found.setdefault(section, {}) if section else found)[name] = entry
-    found["title"] = f"hardened from {scenario.name}: fitness {step.fitness:.4f}, r_min {step.r_min:.3g} m"
-    return found
+    changed = {key: value for key, value in step.parameters.items() if value != known[key][1]}
+    entries = {
+        key: {"value": value, "unit": known[key][0].unit, "source": f"hardened from {known[key][1]:g}"}
+        for key, value in changed.items()
+    }
+    title = f"hardened from {scenario.name}: fitness {step.fitness:.4f}, r_min {step.r_min:.3g} m"
+    return document_with_numbers(scenario, entries, title)

@@ -104,11 +104,6 @@ def limit_report_line(entry: Mapping[str, Any]) -> str:
     )
 
 
-def rarest_probability(limits: Sequence[EventLimit], scenario: Scenario) -> float:
-    """Return the smallest probability per flight that a limit allows; 1 without limits."""
-    return min((allowed_probability(limit, scenario) for limit in limits), default=1.0)
-
-
 def flights_per_event(limits: Sequence[EventLimit], scenario: Scenario) -> int:
-    """Return the number of flights in which one event of the rarest limit is expected if it is just kept."""
-    return math.ceil(1.0 / rarest_probability(limits, scenario))
+    """Return the number of flights in which one event of the rarest limit is expected if it is just kept; 1 of none."""
+    return math.ceil(1.0 / min((allowed_probability(limit, scenario) for limit in limits), default=1.0))

@@ -405,15 +405,12 @@ def load_study(
     with as_error(path):
         if path.suffix == ".toml" and is_file(path):
             document = read_toml(path)
+        folder, where = path.parent, text if text in known else str(path)
         if not tells_of_study(document):
             # A scenario is a study without a space and an objective: both are defaults then.
-            document = {"scenario": text, **(tables or {})}
-            return make_study(document, text, settings=settings, search=search, limits=limits, trust=trust)
-        where = text if text in known else str(path)
+            document, folder, where = {"scenario": text}, None, text
         document = {**document, **(tables or {})}
-        return make_study(
-            document, where, settings=settings, search=search, folder=path.parent, limits=limits, trust=trust
-        )
+        return make_study(document, where, settings=settings, search=search, folder=folder, limits=limits, trust=trust)
 
 
 def study_of_request(

@@ -159,6 +159,18 @@ def further_best_files(folder: Path) -> list[Path]:
     return list(itertools.takewhile(Path.is_file, found))
 
 
+def document_with_numbers(
+    scenario: Scenario, entries: Mapping[str, Mapping[str, Any]], title: str, **sections: Any
+) -> dict[str, Any]:
+    """Return a scenario file with some numbers of its own, each with its source, by key; `sections` replace others."""
+    document = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document), **sections}
+    document.pop("published", None)
+    for key, entry in entries.items():
+        section, _, name = key.rpartition(".")
+        (document.setdefault(section, {}) if section else document)[name] = dict(entry)
+    return {**document, "title": title}
+
+
 def best_document(
     study: Study, parameters: dict[str, float], result: EvolveResult, folder: Path, scenario_index: int = 0
 ) -> dict[str, Any]:
@@ -166,23 +178,17 @@ def best_document(
 
     scenario_index : which of the study's scenarios
     """
-    scenario = study.scenarios[scenario_index]
-    document = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
-    document.pop("published", None)
-    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    scenario, sections = study.scenarios[scenario_index], {}
+    model = to_toml_values(scenario.document).get("model", {})
+    law = Path(scenario.name).parent / str(model.get("kind", ""))
     if law.suffix == ".py" and law.is_file():
         atomic.write_file(folder / law.name, law.read_bytes())
-        document["model"]["kind"] = law.name
+        sections = {"model": {**model, "kind": law.name}}
     source = f"evolved: {study.search.algorithm}, {result.candidate_count} evaluations, seed {study.whole('seed')}"
-    units = {axis.key: axis.unit for axis in study.space.axes}
-    for key, value in parameters.items():
-        section, _, name = key.rpartition(".")
-        entry: dict[str, Any] = {"value": value, "source": source}
-        if key in units:
-            entry = {"value": value, "unit": units[key], "source": source}
-        (document.setdefault(section, {}) if section else document)[name] = entry
-    document["title"] = f"evolved from {scenario.name}: {study.objectives[0].name} {result.fitness:.4f}"
-    return dict(document)
+    units = {axis.key: {"unit": axis.unit} for axis in study.space.axes}
+    entries = {k: {"value": value, **units.get(k, {}), "source": source} for k, value in parameters.items()}
+    title = f"evolved from {scenario.name}: {study.objectives[0].name} {result.fitness:.4f}"
+    return document_with_numbers(scenario, entries, title, **sections)
 
 
 DURATION_COLUMN = "duration"  # key of the scenario that short flights set, column of their table

@@ -318,7 +318,11 @@ STAGES = {
     COUNT_BATCH.stage: "certificate",
     "tolerance": "how far numbers may change",
 }  # fmt: skip
-BY_STAGE = "SELECT stage, count(*), min(seed), max(seed) FROM flight GROUP BY stage"
+# Flights of all values of a tolerance ("tolerance:KEY") count as one stage.
+BY_STAGE = (
+    "SELECT substr(stage || ':', 1, instr(stage || ':', ':') - 1) AS of, count(*), min(seed), max(seed) "
+    "FROM flight GROUP BY of"
+)
 
 
 def flight_rows(result: TuneResult) -> list[tuple[str, str, str]]:
@@ -328,22 +332,12 @@ def flight_rows(result: TuneResult) -> list[tuple[str, str, str]]:
 
 
 def _stored(folder: Path) -> list[tuple[str, str, str]]:
-    """Return the stored flights of a folder by stage; flights of all tolerance values count as one stage."""
-    kept: dict[str, tuple[int, int, int]] = {}
+    """Return the stored flights of a folder by stage, in the order of `STAGES`; unknown stages come last."""
     with FlightStore(folder, write=False) as store:
-        for stage, count, low, high in store.rows(BY_STAGE):
-            name = str(stage).partition(":")[0]
-            n, least, most = kept.get(name, (0, int(low), int(high)))
-            kept[name] = (n + int(count), min(least, int(low)), max(most, int(high)))
-    return [
-        (STAGES.get(name, name), f"{n:,}", f"{least} to {most}")
-        for name, (n, least, most) in sorted(kept.items(), key=lambda each: _place(each[0]))
-    ]
-
-
-def _place(stage: str) -> int:
-    """Return the place of a stage in their order; unknown stages come last."""
-    return list(STAGES).index(stage) if stage in STAGES else len(STAGES)
+        known = {str(stage): numbers for stage, *numbers in store.rows(BY_STAGE)}
+    order = [stage for stage in STAGES if stage in known] + [stage for stage in known if stage not in STAGES]
+    found = [(STAGES.get(stage, stage), *known[stage]) for stage in order]
+    return [(name, f"{count:,}", f"{low} to {high}") for name, count, low, high in found]
 
 
 def circumstance_sentences(result: TuneResult) -> list[str]:
