@@ -272,8 +272,8 @@ def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, se
         return trials.first_mismatch([(measure(zero, track), track.states)]) if part.is_exact(zero) else ""
 
     rules, tracks = rules_of(part, ("measure", "error")), [draw(k) for k in range(TRACKS)]
-    usual = dict(zip(COMPONENTS, (1.0, 2.0, 3.0, 0.5, 0.25, 0.125), strict=True)) | {"dx": 0.3, "dv": 0.1, "g": 0.4}
-    usual |= {"memory": start, "period": period}
+    usual: dict[str, Any] = {"dx": 0.3, "dv": 0.1, "g": 0.4, "memory": start, "period": period}
+    usual |= dict(zip(COMPONENTS, (1.0, 2.0, 3.0, 0.5, 0.25, 0.125), strict=True))
     givens = [{**usual, **draws(k, k), "time": k * period} for k in range(5)]
     trials = Trials(part, rules, "s", s, measure, tracks, seed, scale, givens)
     shift = np.array([*SHIFT.values(), 0.0, 0.0, 0.0])

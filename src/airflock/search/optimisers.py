@@ -87,7 +87,8 @@ class PymooOptimiser:
         """`convert` makes points of the algorithm's own candidates; `seed` decides all random numbers."""
         from pymoo.core.termination import NoTermination
 
-        self.algorithm, self.convert, self.generation = algorithm, convert, None
+        self.algorithm, self.convert = algorithm, convert
+        self.generation: Any = None
         algorithm.setup(problem, termination=NoTermination(), seed=seed, verbose=False)
 
     def ask(self) -> NDArray[Any]:

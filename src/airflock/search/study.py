@@ -405,7 +405,8 @@ def load_study(
     with as_error(path):
         if path.suffix == ".toml" and is_file(path):
             document = read_toml(path)
-        folder, where = path.parent, text if text in known else str(path)
+        folder: Path | None = path.parent
+        where = text if text in known else str(path)
         if not tells_of_study(document):
             # A scenario is a study without a space and an objective: both are defaults then.
             document, folder, where = {"scenario": text}, None, text
