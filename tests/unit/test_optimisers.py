@@ -7,8 +7,8 @@ import toys
 from airflock.runs.executors import ThreadExecutor
 from airflock.runs.flight_store import FlightStore
 from airflock.search.generations import Evaluator, race_candidates
-from airflock.search.objectives import Objective, candidate_losses
 from airflock.search.optimisers import binary_genetic, decode, make_optimiser, pareto_front
+from airflock.search.study import Objective, candidate_losses
 from airflock.support.errors import StudyError
 from airflock_papers.dimock_2003.ga import minimise_over_bits
 

@@ -176,19 +176,12 @@ def _zeros(record: type[Any]) -> Any:
     return record(*([0.0] * len(record._fields)))
 
 
-class SightProtocol(Protocol):
-    """A world that hides agents from each other."""
-
-    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
-        """Return True if something stands between two positions, m."""
-
-
 def met_neighbours(
     topology: Topology | None,
     t: Any,
     own: State,
     heard: Iterable[HeardNeighbour],
-    place: SightProtocol | None = None,
+    place: "WorldMap | None" = None,
 ) -> list[HeardNeighbour]:
     """Select the heard neighbours that an agent meets, in their order.
 

@@ -25,11 +25,6 @@ RULES = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class NoParameters(Parameters):
-    """No number."""
-
-
 @dataclass(frozen=True)
 class Topology:
     """A kind of topology: one plain function over rows, whose argument names are its requests (`core.vocabulary`).
@@ -65,7 +60,7 @@ def topology(namespace: Any, name: str = "") -> Topology:
     Raises RuleError if it has no such rule, or one that asks for what there is not.
     """
     found, name = namespace_names(namespace, name)
-    rule, record = found.get("meet"), found.get("Parameters", NoParameters)
+    rule, record = found.get("meet"), found.get("Parameters", Parameters)
     if not callable(rule):
         raise RuleError(f"topology {name} has no rule; give meet(n, r2, met), which fills met")
     if "met" not in argument_names(rule, "meet", name):

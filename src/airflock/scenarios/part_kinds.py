@@ -117,11 +117,6 @@ def without_unknown_numbers(document: dict[str, Any], section: str, record: type
 DESCENT = model(descent, "drag_descent")
 
 
-def with_drag_descent(model: Model) -> Model:
-    """Return a model with drag descent added to its command."""
-    return add_laws(model, DESCENT)
-
-
 def drag_descent_errors(model: Model) -> list[str]:
     """Return why drag descent cannot be added to a model, one line."""
     if model.flock is not None:
@@ -169,7 +164,7 @@ def collect_parts(
         # what the body takes, so the law's command is converted before.
         more = drag_descent_errors(law)
         errors.add(*more)
-        law = law if more else with_drag_descent(law)
+        law = law if more else add_laws(law, DESCENT)
     metrics = one(SETS, caller_parts.metrics)
     sensors = one(SENSORS, caller_parts.sensors)
     transmission = one(RADIOS, caller_parts.radio)

@@ -49,7 +49,7 @@ from airflock.scenarios.settings import (
     settings_dict,
     with_kinds,
 )
-from airflock.support import ErrorCollector, ParameterError, ScenarioError, is_file
+from airflock.support import ErrorCollector, ParameterError, ScenarioError, is_file, is_number
 from airflock.world import edge_rows, obstacle
 
 
@@ -231,15 +231,11 @@ def _published(table: Any, errors: ErrorCollector) -> dict[str, tuple[float, flo
             numbers = [entry.get("mean"), *([entry["sd"]] if "sd" in entry else [])]
         else:
             numbers = list(entry) if isinstance(entry, (list, tuple)) else [entry]
-        if 1 <= len(numbers) <= 2 and all(map(_finite, numbers)):
+        if 1 <= len(numbers) <= 2 and all(is_number(number) and abs(number) < 1e300 for number in numbers):
             published[key] = (float(numbers[0]), float(numbers[1]) if len(numbers) == 2 else None)
         else:
             errors.add(f"published.{key} = {entry!r}: give a number, [mean, sd], or {{ mean = ..., sd = ... }}")
     return published
-
-
-def _finite(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
 
 
 FIXED_KEYS = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change

@@ -38,9 +38,10 @@ from airflock.runs import (
 )
 from airflock.scenarios import Scenario, load, scenario_variant
 from airflock.search.generations import Evaluator, conclude_study, run_search
-from airflock.search.objectives import Objective, UserFitness
 from airflock.search.study import (
+    Objective,
     Study,
+    UserFitness,
     fast_search_keys as fast_keys,
     is_study,
     load_study,

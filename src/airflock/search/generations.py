@@ -36,9 +36,8 @@ from airflock.runs import (
 )
 from airflock.scenarios import Scenario
 from airflock.search.limit_excess import batch_excess, limit_reports, rank_by_excess
-from airflock.search.objectives import Objective, candidate_losses
 from airflock.search.optimisers import make_optimiser, pareto_front
-from airflock.search.study import Study, combine_scenarios
+from airflock.search.study import Objective, Study, candidate_losses, combine_scenarios
 from airflock.search.study_result import (
     DURATION_COLUMN,
     EvolveResult,

@@ -39,8 +39,7 @@ from airflock.runs import (
 from airflock.scenarios import Scenario, check_seeds, load_if_named, rebuilt
 from airflock.search.generations import ZERO_FITNESS, zero_fitness_reason
 from airflock.search.limit_excess import allowed_probability, limit_excess
-from airflock.search.objectives import read_limits
-from airflock.search.study import SearchSettings
+from airflock.search.study import SearchSettings, read_limits
 from airflock.search.study_result import document_with_numbers, mean_interval
 from airflock.support import ErrorCollector, ScenarioError
 

@@ -1,17 +1,22 @@
 """Study: an optimisation as data: a scenario, a space, what is better, and how to search; from a file or by name."""
 
+import hashlib
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+import traceback
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from airflock import __version__
-from airflock.certificates import EventLimit
+from airflock.certificates import EventLimit, parse_limits
 from airflock.core import Parameters as Record, Quantity, choice, declarations, format_with_unit, number_names, quantity
 from airflock.runs import (
     SearchAxis,
@@ -29,6 +34,7 @@ from airflock.scenarios import (
     files_of_laws,
     formats,
     html_table,
+    import_user_file,
     largest_extension,
     load,
     presets,
@@ -36,14 +42,15 @@ from airflock.scenarios import (
     schema,
     tells_of_study,
 )
-from airflock.search.objectives import Objective, read_limits, read_objectives
 from airflock.search.optimisers import ALGORITHMS, MULTI_OBJECTIVE
 from airflock.support import (
     ErrorCollector,
+    RuleError,
     ScenarioError,
     StudyError,
     TextError,
     as_error,
+    describe_error,
     expand_path,
     is_file,
     is_number,
@@ -51,6 +58,179 @@ from airflock.support import (
     shortened,
     suggest,
 )
+
+OVER_SEEDS = ("mean", "worst", "quantile")
+UserFitness = Callable[
+    [Mapping[str, Any]], float
+]  # a fitness of the user's own, from the order parameters of one flight
+
+
+@dataclass(frozen=True)
+class Objective:
+    """One aim: a larger (or smaller) order parameter, over the seeds of a candidate.
+
+    name       : an order parameter, or the name of a function of the user's own
+    maximise   : False where less is better
+    own, text  : a function of the user's own, and a hash of its text; file : that holds it, if it is one
+    over_seeds : mean, worst case, or the value that all but a share `quantile` of the flights reach
+    """
+
+    name: str
+    maximise: bool = True
+    over_seeds: str = "mean"
+    quantile: float = 0.1
+    own: UserFitness | None = None
+    text: str = ""
+    file: str = ""
+
+    def of_flight(self, values: Mapping[str, Any]) -> float:
+        """Value of one flight; nan where it is not finite, or where a function of the user's own fails."""
+        if self.own is None and self.name not in values:
+            known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
+            raise StudyError(f"objective {self.name}: unknown order parameter; known: {known}")
+        if self.own is not None:
+            value = user_fitness(self.own, self.name, values)[0]
+        elif isinstance(values[self.name], (int, float)):
+            value = float(values[self.name])
+        else:
+            raise StudyError(f"objective {self.name} = {shortened(repr(values[self.name]), 80)} is not a number")
+        return value if math.isfinite(value) else math.nan
+
+    def of_candidate(self, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
+        """Value over the flights of a candidate; None if one of them failed."""
+        if any(values is None for values in flights):
+            return None
+        found = [self.of_flight(values) for values in flights if values is not None]
+        if not found or not all(math.isfinite(value) for value in found):
+            return None
+        if self.over_seeds == "worst":
+            return min(found) if self.maximise else max(found)
+        if self.over_seeds == "quantile":
+            return float(np.quantile(found, self.quantile if self.maximise else 1.0 - self.quantile))
+        # fsum rounds once: a mean must not depend on the order in which flights have landed.
+        return math.fsum(found) / len(found)
+
+    def error_of_flight(self, values: Mapping[str, Any]) -> tuple[str, bool]:
+        """Return how the user's own function fails for a flight, "" where it does not; and True if in its numbers."""
+        return ("", False) if self.own is None else user_fitness(self.own, self.name, values)[1:]
+
+
+def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) -> tuple[float, str, bool]:
+    """Call the user's own function for one flight; an error in it becomes nan and one line with its place.
+
+    The last value is True for an error of arithmetic, which a flight may cause; others are rather
+    in the text.
+    """
+    try:
+        return float(function(values)), "", False
+    except (Exception, SystemExit) as error:  # the user's own function may fail in any way
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        code = getattr(function, "__code__", None)
+        place = f"{last.filename}:{last.lineno}"
+        if last.filename == __file__ and code is not None:  # it returned, but no number
+            place = f"{code.co_filename}:{code.co_firstlineno}"
+        line = f"objective {name}: {place}: {describe_error(error)}"
+        return math.nan, line, isinstance(error, ArithmeticError)
+
+
+def candidate_losses(
+    fitness_rows: Sequence[Sequence[float | None]], objectives: Sequence[Objective]
+) -> NDArray[np.float64]:
+    """Return losses (candidate, objective) to minimise; a failed candidate is worse than all of its generation."""
+    signs = [-1.0 if objective.maximise else 1.0 for objective in objectives]
+    table = np.array(
+        [[math.nan if v is None else s * v for s, v in zip(signs, row, strict=True)] for row in fitness_rows], float
+    )
+    for column in table.T:
+        lost = np.isnan(column)
+        worst = column[~lost].max() if (~lost).any() else 0.0
+        # Optimisers here rank candidates, so any loss beyond the worst will do.
+        column[lost] = worst + 1.0
+    return table
+
+
+OBJECTIVE_KEYS = ("maximise", "minimise", "limits", "over_seeds", "quantile", "own", "source", "note")
+
+
+def read_objectives(
+    table: Any, scenario: Scenario, errors: ErrorCollector, folder: Path | None = None, *, trust: bool = False
+) -> tuple[Objective, ...]:
+    """Read objectives from a table, by default the scenario's usual fitness.
+
+    trust : whether the file of functions that objective.own names may run
+    """
+    if not isinstance(table, Mapping):
+        errors.add(f"objective = {table!r} is not a table; write objective.maximise = {table!r}")
+        return ()
+    for key in table:
+        if key not in OBJECTIVE_KEYS:
+            hint = suggest(key, OBJECTIVE_KEYS, f"known: {', '.join(OBJECTIVE_KEYS)}", prefix="objective.")
+            errors.add(f"objective.{key}: unknown key; {hint}")
+    over, quantile = table.get("over_seeds", "mean"), table.get("quantile", 0.1)
+    if not isinstance(over, str) or over not in OVER_SEEDS:
+        errors.add(f"objective.over_seeds = {over!r} is none of {', '.join(OVER_SEEDS)}")
+    if not is_number(quantile) or not 0.0 <= quantile <= 1.0:
+        errors.add(f"objective.quantile = {quantile!r} lies outside [0, 1]")
+        quantile = 0.1
+    own, text, file = _own(table.get("own"), folder, errors, trust)
+    goals: list[tuple[str, bool]] = []
+    for key in ("maximise", "minimise"):
+        named = table.get(key, [])
+        names = [named] if isinstance(named, str) else named
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            errors.add(f"objective.{key} = {named!r} is neither a name nor a list of names")
+            continue
+        goals += [(name, key == "maximise") for name in names]
+    found = tuple(
+        Objective(name, more, str(over), float(quantile), own.get(name), *((text, file) if name in own else ()))
+        for name, more in goals or [(scenario.metrics.rule.best or "fitness", True)]
+    )
+    if text and not any(objective.own for objective in found):
+        module = Path(str(table["own"])).stem
+        names = [name for name, function in own.items() if getattr(function, "__module__", "") == module]
+        write = f"write objective.maximise = '{names[0]}'" if names else "it holds no function"
+        others = f" (it holds {', '.join(names)})" if len(names) > 1 else ""
+        errors.add(f"objective.own = {table['own']!r}: no objective names a function of this file; {write}{others}")
+    return found
+
+
+def read_limits(table: Any, scenarios: Sequence[Scenario], errors: ErrorCollector) -> tuple[EventLimit, ...]:
+    """Read the limits that candidates are to keep in all scenarios, from the key `limits` of a table."""
+    texts = table.get("limits", []) if isinstance(table, Mapping) else []
+    texts = [texts] if isinstance(texts, str) else texts
+    if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
+        errors.add(f"objective.limits = {texts!r} is neither a limit nor a list of limits, as 'r_min<3 at 0.01/h'")
+        return ()
+    found: tuple[EventLimit, ...] = ()
+    for scenario in scenarios if texts else ():
+        with errors.collecting("objective.limits: "):
+            parsed = parse_limits(list(texts), scenario)
+            found = found or parsed
+    how = "does not say how rarely; write {} at 0.01/h, for instance"
+    unsaid = [limit for limit in found if limit.rate is None]
+    errors.add(*(f"objective.limits: limit '{limit.text}': {how.format(limit.event)}" for limit in unsaid))
+    return found
+
+
+def _own(
+    name: Any, folder: Path | None, errors: ErrorCollector, trust: bool
+) -> tuple[dict[str, UserFitness], str, str]:
+    """Return the functions of a user's own file by name, a hash of its text, and its place."""
+    if name is None:
+        return {}, "", ""
+    path = expand_path(str(name)) if folder is None else folder / expand_path(str(name))
+    if path.suffix != ".py" or not is_file(path):
+        errors.add(f"objective.own = {name!r}: no such Python file")
+        return {}, "", ""
+    try:
+        text = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+        module = import_user_file(path, f"objective.own = {name!r}", trust=trust)
+    except (RuleError, ScenarioError) as error:
+        errors.add(*(error.errors if isinstance(error, ScenarioError) else [f"objective.own: {error}"]))
+        return {}, "", ""
+    own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
+    return own, text, str(path)
+
 
 S6 = "Vásárhelyi et al. 2018, Table S6"
 SEED_BITS = 40  # numbers of flights within one study; seeds 0, 1, 2, ... that people give by hand lie below all studies
@@ -586,8 +766,6 @@ def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]
     # One set of numbers has to fly in all scenarios, so the search sees every region that is usual
     # in one of them.
     space, notes = default_space(scenarios[0])
-    if len(scenarios) == 1:
-        return space, notes
     axes = {axis.key: axis for axis in space.axes}
     for scenario in scenarios[1:]:
         more, more_notes = default_space(scenario)
@@ -767,8 +945,7 @@ def default_space(scenario: Scenario) -> tuple[SearchSpace, list[str]]:
         axes = [_around(scenario, axis) for axis in searched]
         notes = [f"no study of {scenario.model.name} is shipped: bounds a factor of {AROUND:g} about its own values"]
     else:
-        name, speed, known = found
-        ratio = _speed(scenario) / speed if speed else 1.0
+        name, ratio, known = found
         # what the study held fixed stays as the scenario has it
         axes = [_scaled(scenario, known[axis.key], axis, ratio) for axis in searched if axis.key in known]
         scaled = f", lengths and speeds times {ratio:.3g}" if ratio != 1.0 else ""
@@ -780,11 +957,7 @@ def default_space(scenario: Scenario) -> tuple[SearchSpace, list[str]]:
 
 def shipped_study_axes(scenario: Scenario) -> dict[str, tuple[float, float]]:
     """Bounds of the shipped study of the same law that is nearest in speed, by key; none where no study is shipped."""
-    found = _nearest_study(scenario)
-    if found is None:
-        return {}
-    _, speed, known = found
-    ratio = _speed(scenario) / speed if speed else 1.0
+    _, ratio, known = _nearest_study(scenario) or ("", 1.0, {})
     scaled = [_scaled(scenario, known[own.key], own, ratio) for own in full_space(scenario).axes if own.key in known]
     return {axis.key: (axis.low, axis.high) for axis in scaled}
 
@@ -806,7 +979,7 @@ def _speed(scenario: Scenario) -> float:
 
 
 def _nearest_study(scenario: Scenario) -> tuple[str, float, dict[str, SearchAxis]] | None:
-    """Name, speed (m/s) and axes of the shipped study of the same law, nearest in speed; None if there is none."""
+    """Return name, ratio of the speeds and axes of the shipped study of the same law that is nearest in speed."""
     speed, best = _speed(scenario), None
     for name, model, theirs, axes in _studies():
         if model != scenario.model.name or not axes:
@@ -815,7 +988,7 @@ def _nearest_study(scenario: Scenario) -> tuple[str, float, dict[str, SearchAxis
         if name == scenario.name:
             away = -1.0
         if best is None or away < best[0]:
-            best = (away, name, theirs if speed > 0.0 else 0.0, {axis.key: axis for axis in axes})
+            best = (away, name, speed / theirs if speed > 0.0 and theirs else 1.0, {axis.key: axis for axis in axes})
     return None if best is None else best[1:]
 
 

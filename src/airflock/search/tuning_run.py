@@ -90,10 +90,6 @@ class BudgetPlan:
     limits: list[str] = field(default_factory=list)
     confidence: float = DEFAULT_CONFIDENCE
 
-    def document(self) -> dict[str, Any]:
-        """Return the plan as plain values."""
-        return {"airflock": __version__, **asdict(self)}
-
 
 def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_limits: int = USUAL) -> BudgetPlan:
     """Make a plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
@@ -144,7 +140,7 @@ class Tuning:
         """Return the tuning as plain values: the request in its folder."""
         start = self.start
         of = {"identity": scenario_identity(start), "name": start.name, "scenario": unpublished(start)}
-        return {**self.plan.document(), **of}
+        return {"airflock": __version__, **asdict(self.plan), **of}
 
 
 @dataclass(frozen=True)
