@@ -50,3 +50,12 @@ def test_opposite_headings_look_different(who):
     turn = np.linspace(0.0, 0.5, 12, endpoint=False)
     one, other = (lab(agent_colours.wheel_colours(turn + half), SEEN[who]) for half in (0.0, 0.5))
     assert np.linalg.norm(one - other, axis=1).min() > AT_A_GLANCE
+
+
+@pytest.mark.parametrize("kind", ["scale", "turn", "names", "marks"])
+@pytest.mark.parametrize("count", [0, 5])
+def test_agents_without_a_value_are_grey_whatever_they_are_coloured_by(kind, count):
+    """A flock without faults has no names of faults, and colouring it by them must not end the page."""
+    missing = np.full(count, np.nan if kind in ("scale", "turn") else -1.0)
+    shown = agent_colours.AgentColours("fault", kind, missing)
+    assert (shown.colours == agent_colours.NO_VALUE_COLOUR).all() and shown.colours.shape == (count, 3)

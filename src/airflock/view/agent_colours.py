@@ -143,7 +143,7 @@ class AgentColours(NamedTuple):
         if self.kind == NUMBERS:
             tones = ramp_colours((whole - self.low) / max(self.high - self.low, 1e-9))
         elif self.kind == CATEGORIES:
-            tones = category_colours(len(self.names))[whole.astype(int)]
+            tones = category_colours(max(len(self.names), 1))[whole.astype(int)]  # of no names all have none
         else:
             tones = wheel_colours(whole if self.kind == HEADING else whole * GOLDEN_TURN)
         tones[~known] = NO_VALUE_COLOUR
