@@ -6,7 +6,9 @@ from types import SimpleNamespace
 import pytest
 
 from airflock.engine import Flight
-from airflock.studio.browser_view import Widgets
+from airflock.parts import FAULTS
+from airflock.studio.browser_view import BrowserView, Widgets
+from airflock.studio.flight_page import FlightPage
 from airflock.studio.page_panels import OpeningPanel, PlaybackPanel
 from airflock.studio.player import FlightRequest, Player
 from airflock.support import atomic
@@ -138,3 +140,30 @@ def test_the_command_holds_every_digit(player):
     number = 0.1234567890123456
     player.change("model.p_rep", number)
     assert f"--set model.p_rep={number!r}" in player.command and "agents=5" in player.command
+
+
+@pytest.fixture
+def page(player):
+    """A page of that flight with nobody before it, on which every press of a button is heard at once."""
+    view = BrowserView("127.0.0.1", 0, "nobody")
+    made = FlightPage(player, view)
+    yield made
+    view.stop()
+
+
+def test_a_fault_begun_by_hand_and_given_up_leaves_no_controls_behind(player, page):
+    for kind in FAULTS:
+        page.selection.select(2)
+        page.selection.fault.value = kind
+        assert asked(player, page.selection.begin_fault) == []
+        page.frame(True)
+        assert asked(player, lambda: page.playback.go_back(0.0)) == []
+        page.frame(True)
+        assert not player.flight.faults and not [key for key in page.tuning._handles if key.startswith("faults")], kind
+
+
+def test_a_page_shows_every_colouring_of_a_flock_without_faults(player, page):
+    for name in page.playback.colouring_menu.options:
+        page.scene.colouring.name = name
+        page.frame(True)
+        assert page.scene.colouring.shown.name == name

@@ -635,7 +635,6 @@ class TuningPanel(PagePanel):
                 folder.remove()
             self._fault_folders, self._fault_names, self._handles, self._controls_for = [], None, {}, made_for
             self._folders = self._made(scenario_controls(preset, shipped_study_axes(preset)))
-        self._rebuild_faults()
         self.show_values()
 
     def _rebuild_faults(self) -> None:
@@ -662,7 +661,8 @@ class TuningPanel(PagePanel):
         return folders
 
     def show_values(self) -> None:
-        """Show the values in force."""
+        """Show the values in force, of faults that there are by now: one begun by hand may have been given up."""
+        self._rebuild_faults()
         values = {key: scenario_value(self.player.scenario, key) for key in self._handles}
         self.show_on_controls({key: value for key, value in values.items() if value != self._handles[key][0].value})
 
