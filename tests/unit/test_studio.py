@@ -129,7 +129,7 @@ def test_every_number_of_the_law_has_a_slider_that_can_reach_its_value(name):
     for controls in found.values():
         for control in controls:
             assert control.value == scenario_value(scenario, control.key)
-            if control.is_choice:
+            if control.options:
                 assert control.value in control.options
             else:
                 assert control.low <= control.value <= control.high and 0.0 < control.step <= control.high - control.low

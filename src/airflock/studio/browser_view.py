@@ -125,32 +125,26 @@ class Widgets:
         """Bind a key to an action."""
         self.server.gui.add_command(label, hotkey=key).on_trigger(lambda _: action())
 
-    def add_checkbox(self, label: str, value: bool, action: Callable[[bool], None], hint: str = "") -> Any:
+    def add_checkbox(self, label: str, value: bool, action: Callable[[bool], None]) -> Any:
         """Add a switch; its state is `.value`."""
-        handle = self.server.gui.add_checkbox(label, value, hint=hint or None)
-        handle.on_update(lambda event: action(bool(event.target.value)) if event.client is not None else None)
-        return handle
+        return _when_moved(self.server.gui.add_checkbox(label, value), action)
 
     def add_menu(
         self, label: str, options: Sequence[str], value: str, action: Callable[[str], None], hint: str = ""
     ) -> Any:
         """Add a menu; the chosen entry is `.value`."""
-        handle = self.server.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint or None)
-        handle.on_update(lambda event: action(event.target.value) if event.client is not None else None)
-        return handle
+        return _when_moved(
+            self.server.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint or None), action
+        )
 
     def number(self, label: str, value: int, low: int, high: int, action: Callable[[int], None], hint: str = "") -> Any:
         """Add a field for a whole number; beyond its ends it is ignored until the field is left, then set to the
         end.
         """
-        handle = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
-
-        @handle.on_update
-        def _(event: Any) -> None:
-            if event.client is not None and low <= event.target.value <= high:
-                action(int(event.target.value))
-
-        return handle
+        return _when_moved(
+            self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None),
+            lambda typed: action(int(typed)) if low <= typed <= high else None,
+        )
 
     def field(self, label: str, hint: str = "") -> Any:
         """Add a field for a line of text: `.value`."""
@@ -162,30 +156,13 @@ class Widgets:
         handle.on_upload(lambda event: action(event.target.value.name, event.target.value.content))
         return handle
 
-    def add_slider(
-        self, label: str, low: float, high: float, step: float, value: float, action: Callable[[float], None],
-        hint: str = "",
-    ) -> Any:  # fmt: skip
-        """Add a slider; `action` is called when a reader moves it, not when the program sets its value."""
-        handle = self.server.gui.add_slider(label, low, high, step, value, hint=hint or None)
-        handle.on_update(lambda event: action(float(event.target.value)) if event.client is not None else None)
-        return handle
-
     def add_control(self, control: ParameterControl, action: Callable[[str, Any], None]) -> Any:
         """Add a slider or a menu for a parameter."""
-        if control.is_choice:
-            return self.add_menu(
-                control.label, control.options, control.value, lambda v: action(control.key, v), control.hint
-            )
-        return self.add_slider(
-            control.label,
-            control.low,
-            control.high,
-            control.step,
-            control.value,
-            lambda v: action(control.key, v),
-            control.hint,
-        )
+        c = control
+        if c.options:
+            return self.add_menu(c.label, c.options, c.value, lambda v: action(c.key, v), c.hint)
+        slider = self.server.gui.add_slider(c.label, c.low, c.high, c.step, c.value, hint=c.hint or None)
+        return _when_moved(slider, lambda v: action(c.key, float(v)))
 
     def add_chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Chart:
         """Add a chart: `.data` is (time or `across`, *values). With a band, the last two are its ends, shaded."""
@@ -209,6 +186,12 @@ class Widgets:
             client.add_notification(title, body, color="red" if is_error else "blue", auto_close_seconds=8.0)
 
 
+def _when_moved(handle: Any, action: Callable[[Any], None]) -> Any:
+    """Call `action` with the value of a control when a reader moves it, not when the program sets it."""
+    handle.on_update(lambda event: action(event.target.value) if event.client is not None else None)
+    return handle
+
+
 TRAIL_PIECES = 40  # nodes, rewritten in turn: a trail is so many frames long
 FLAT_FIELD_OF_VIEW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
 SPACE_FIELD_OF_VIEW = 0.8
@@ -227,9 +210,10 @@ class BrowserView:
     """
 
     def __init__(self, host: str, port: int, title: str):
-        free = _free_port(host)  # also where a port is given: a host that is not this machine is an error of its own
-        port = port or free
-        _check_port_free(host, port)
+        # Also where a port is given: a host that is not this machine is an error of its own.
+        free = _free_port(host, 0, f"host = {host}", "a name or IPv4 address of this machine, or 0.0.0.0")
+        another = "another port with --port, or --port 0 for any free one"
+        port = _free_port(host, port or free, f"{host}:{port or free}", another)
         token = secrets.token_urlsafe(12)
         console = rich.get_console()
         console.quiet = True  # viser prints panels of its own
@@ -452,28 +436,16 @@ def _linear_light(colour: NDArray[Any]) -> NDArray[np.uint8]:
     return np.asarray(np.round(255.0 * light), np.uint8)
 
 
-def _free_port(host: str) -> int:
-    with socket.socket() as probe:
-        try:
-            probe.bind((host, 0))
-        except OSError as error:
-            raise StudioError(
-                f"host = {host}: {error.strerror or error}; give a name or IPv4 address of this machine, or 0.0.0.0"
-            ) from error
-        return int(probe.getsockname()[1])
-
-
-def _check_port_free(host: str, port: int) -> None:
-    """Raise StudioError where nothing can listen at a port; viser would take the next one without a word."""
+def _free_port(host: str, port: int, subject: str, instead: str) -> int:
+    """Return a port, 0 for any free one. Raise StudioError where nothing can listen; viser would take the next one."""
     with socket.socket() as probe:
         # A port that a page has just left may be used again at once, as viser does.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
         except OSError as error:
-            raise StudioError(
-                f"{host}:{port}: {error.strerror or error}; give another port with --port, or --port 0 for any free one"
-            ) from error
+            raise StudioError(f"{subject}: {error.strerror or error}; give {instead}") from error
+        return int(probe.getsockname()[1])
 
 
 def _round_length(length: float) -> float:

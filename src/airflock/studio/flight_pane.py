@@ -209,11 +209,6 @@ class ParameterControl(NamedTuple):
     step: float = math.nan
     options: tuple[str, ...] = ()
 
-    @property
-    def is_choice(self) -> bool:
-        """True for a menu, False for a slider."""
-        return bool(self.options)
-
 
 def scenario_controls(
     scenario: Scenario, default_spans: Mapping[str, tuple[float, float]] | None = None

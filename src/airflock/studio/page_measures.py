@@ -110,13 +110,13 @@ class PaneChartData:
     """Data of the charts of one pane: instants, the course of one order parameter of the present window, and how
     often which speed and which distance to the nearest neighbour was seen in it.
 
-    top, far : ends of the histograms, m/s and m
+    max_speed, max_distance : ends of the histograms, m/s and m; name : of the order parameter
     """
 
-    def __init__(self, max_speed: float = 1.0, max_distance: float = 1.0) -> None:
+    def __init__(self, max_speed: float = 1.0, max_distance: float = 1.0, name: str = "") -> None:
         self.instants: deque[FlockInstant] = deque(maxlen=MAX_CHART_POINTS)
         self.score_course: deque[tuple[float, float]] = deque(maxlen=MAX_CHART_POINTS)
-        self.name = ""
+        self.name = name
         self.speed_histogram, self.distance_histogram = Histogram(max_speed), Histogram(max_distance)
         self._window = -1
 

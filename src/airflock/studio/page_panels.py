@@ -414,13 +414,11 @@ class MeasurementPanel(PagePanel):
         self._score_names = [name for name, value in scores.items() if isinstance(value, (int, float))]
         if self.name not in self._score_names:
             self.name = measures.default_score(dict.fromkeys(self._score_names), player.sides[0].scenario.published)
-        self.sides = []
+        far = 1e-6  # one axis for both panes
         for side, flock in zip(player.sides, self.scene.flocks, strict=True):
-            far = float(side.scenario.resolved_metrics().r_cluster or 1.0)
-            apart = flock.pairs.apart()
-            far = min(far, 4.0 * float(np.median(apart))) if len(apart) else far
-            self.sides.append(measures.PaneChartData(self.scene.top, max(far, 1e-6)))
-            self.sides[-1].name = self.name
+            cluster, apart = float(side.scenario.resolved_metrics().r_cluster or 1.0), flock.pairs.apart()
+            far = max(far, min(cluster, 4.0 * float(np.median(apart))) if len(apart) else cluster)
+        self.sides = [measures.PaneChartData(self.scene.top, far, self.name) for _ in player.sides]
         self._make_charts()
 
     def _make_charts(self) -> None:
@@ -428,37 +426,28 @@ class MeasurementPanel(PagePanel):
         panel, player = self.widgets, self.player
         for chart in self._charts:
             chart.remove()
-        two, names = len(player.sides) > 1, self._score_names
-        banded = self.name in player.sides[0].scenario.published
+        two = len(player.sides) > 1
         tags = [f" {name}" for name in PANE_NAMES] if two else [""]
+        bands = BAND_NAMES if self.name in player.sides[0].scenario.published else ()
+
+        def chart_of(title: str, *lines: str, across: str = "t (s)") -> Any:
+            return panel.add_chart(title, [f"{line}{tag}" for tag in tags for line in lines], across=across)
+
         with self.tab:
             self.score_menu = panel.add_menu(
-                "order parameter", names, self.name, lambda n: player.ask(lambda: self._choose(n))
+                "order parameter", self._score_names, self.name, lambda n: player.ask(lambda: self._choose(n))
             )
-            self.score_chart = panel.add_chart(
-                "since the last change", [*(f"value{t}" for t in tags), *(BAND_NAMES if banded else ())], band=banded
-            )
-            words = ("mean", "slowest", "fastest")
-            self.speed_chart = panel.add_chart(
-                "speed (m/s)", [f"{w}{t}" for t in tags for w in (words[:1] if two else words)]
-            )
-            self.nearest = panel.add_chart("smallest distance (m)", [f"nearest pair{t}" for t in tags])
-            self.speed_histogram_chart = panel.add_chart(
-                "speeds since the last change", [f"share{t}" for t in tags], across="m/s"
-            )
-            self.distance_histogram_chart = panel.add_chart(
-                "distance to the nearest", [f"share{t}" for t in tags], across="m"
-            )
+            values = [f"value{tag}" for tag in tags]
+            self.score_chart = panel.add_chart("since the last change", [*values, *bands], band=bool(bands))
+            self.speed_chart = chart_of("speed (m/s)", *(("mean",) if two else ("mean", "slowest", "fastest")))
+            self.nearest = chart_of("smallest distance (m)", "nearest pair")
+            speeds = chart_of("speeds since the last change", "share", across="m/s")
+            distances = chart_of("distance to the nearest", "share", across="m")
             self.table = panel.text()
+        self.histogram_charts = {"speed_histogram": speeds, "distance_histogram": distances}
         self._charts = [
-            self.score_menu,
-            self.score_chart,
-            self.speed_chart,
-            self.nearest,
-            self.speed_histogram_chart,
-            self.distance_histogram_chart,
-            self.table,
-        ]
+            self.score_menu, self.score_chart, self.speed_chart, self.nearest, speeds, distances, self.table,
+        ]  # fmt: skip
 
     def _choose(self, name: str) -> None:
         """Draw another order parameter from now on; with a band only where the paper reports its value."""
@@ -492,11 +481,9 @@ class MeasurementPanel(PagePanel):
         self.speed_chart.data = time, *(np.ascontiguousarray(part[:, c]) for part in parts for c in columns)
         self.nearest.data = time, *(np.ascontiguousarray(part[:, 4]) for part in parts)
         self._draw_course()
-        for chart, shares in (
-            (self.speed_histogram_chart, [side.speed_histogram.steps for side in self.sides]),
-            (self.distance_histogram_chart, [side.distance_histogram.steps for side in self.sides]),
-        ):
-            chart.data = _joined_outlines(shares)
+        for name, chart in self.histogram_charts.items():
+            (values, share), *others = (getattr(side, name).steps for side in self.sides)
+            chart.data = values, share, *(other for _, other in others)
         self.table.content = score_table_html(flights, self.scores)
 
     def _draw_course(self) -> None:
@@ -515,21 +502,6 @@ class MeasurementPanel(PagePanel):
             mean, spread = published[self.name]
             edges = [np.full(len(time), mean + sign * (spread or 0.0)) for sign in (1.0, -1.0)]
         self.score_chart.data = time, *values, *edges
-
-
-def _joined_outlines(outlines: list[Any]) -> tuple[Any, ...]:
-    """Return outlines of histograms over one axis: values and the share of each at them."""
-    if len(outlines) == 1:
-        return tuple(outlines[0])
-    values = np.union1d(outlines[0][0], outlines[1][0])
-    both = np.repeat(values, 2)[1:-1]
-    middle = 0.5 * (both[::2] + both[1::2])
-    found = []
-    for edges, shares in outlines:
-        place = np.searchsorted(edges[::2], middle, side="right") - 1
-        inside = middle <= edges[-1]
-        found.append(np.repeat(np.where(inside, shares[::2][np.clip(place, 0, len(shares) // 2 - 1)], 0.0), 2))
-    return both, *found
 
 
 NO_COMPARISON_TEXT = (

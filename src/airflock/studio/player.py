@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from threading import Event
 from time import perf_counter
 from typing import Any
 
@@ -43,38 +42,24 @@ class PageClock:
         return steps
 
 
-QueuedAction = Callable[[], None]
-
-
 class ActionQueue:
-    """Queue with a bell: the flying thread waits for the next frame or the next action, whichever comes first."""
+    """Queue of actions: the flying thread waits for the next frame or the next action, whichever comes first."""
 
     def __init__(self) -> None:
-        self._actions: SimpleQueue[QueuedAction] = SimpleQueue()
-        self._event = Event()
+        self._actions: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self.put = self._actions.put  # from any thread
 
-    def put(self, action: QueuedAction) -> None:
-        """Queue an action; from any thread."""
-        self._actions.put(action)
-        self._event.set()
-
-    def wait(self, seconds: float) -> bool:
-        """Wait for at most some seconds of real time. Return True if an action is queued."""
-        if not self._event.wait(max(seconds, 0.0)):
-            return False
-        self._event.clear()
-        return True
-
-    def answer(self, run: Callable[[QueuedAction], None]) -> bool:
-        """Hand every queued action to `do`. Return True if there was any."""
+    def answer(self, run: Callable[[Callable[[], None]], None], seconds: float = 0.0) -> bool:
+        """Wait some seconds of real time, or until an action is queued; run all. Return True if there was any."""
         done = False
-        while True:
-            try:
+        try:
+            action = self._actions.get(seconds > 0.0, seconds or None)
+            while True:
+                done = True
+                run(action)
                 action = self._actions.get_nowait()
-            except Empty:
-                return done
-            done = True
-            run(action)
+        except Empty:
+            return done
 
 
 MAX_BYTES = 256 * 2**20  # bytes of all moments together
@@ -154,11 +139,18 @@ class FlightRequest:
         )
 
 
-class ComparedFlights:
-    """One flight of a scenario, or two side by side. They have no clock: `Player` flies them.
+MAX_BUSY_SECONDS = 0.05  # s of real time flown at most before the page is answered again
 
-    Attributes: origins, where they come from; sides, as they fly; hand, which of them the controls
-    act on; note, what was done last, for the page; fault, called with everything that was refused.
+
+class Player:
+    """Flights that are played, one or two side by side: the model behind a page and its controls.
+
+    `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
+
+    Attributes: sources, where the flights come from; sides, as they fly; hand, which of them the
+    controls act on; note, what was done last, for the page; fault, called with everything that was
+    refused; clock, how fast they fly; snapshots, to go back to; is_paused; failure_message, why they
+    stopped, or nothing.
     """
 
     def __init__(self, request: FlightRequest):
@@ -168,10 +160,13 @@ class ComparedFlights:
         self.hand, self.note = 0, ""
         self.fault: Callable[[str], None] = lambda line: None
         self._interpret_first = request.interpret_first
+        self.clock, self.is_paused = PageClock(1.0), False
+        self._steps_per_second = 1e4  # motion steps per second, as measured
+        self._asked = ActionQueue()
         self._open()
 
     def _open(self, place_agents: bool = False) -> None:
-        """Begin the flights of all origins, with agents placed if asked. Raises AirflockError, and changes nothing."""
+        """Begin the flights of all sources, with agents placed if asked. Raises AirflockError, and changes nothing."""
         sides = [FlightPane(origin, self.seed, self._interpret_first) for origin in self.sources]
         if len(sides) == 2 and sides[0].scenario.dimensions != sides[1].scenario.dimensions:
             flown = [f"{side.origin.where} in {side.scenario.dimensions}" for side in sides]
@@ -179,6 +174,8 @@ class ComparedFlights:
         for side in sides if place_agents else ():
             _ = side.motion
         self.sides, self.hand = sides, min(self.hand, len(sides) - 1)
+        self.clock = PageClock(self.preset.flight.dt, self.clock.speed)
+        self.snapshots, self.failure_message = KeptSnapshots(), ""
 
     def start(self) -> None:
         """Place the agents; compiles what has not been compiled yet, unless an interpreted flight stands for it."""
@@ -190,9 +187,14 @@ class ComparedFlights:
         """True while interpreted flights stand for those that are being compiled."""
         return any(side.is_compiling for side in self.sides)
 
-    def switch_to_compiled(self) -> list[Snapshot | None]:
-        """Replace flights by compiled ones, once ready. Return their starts; None for those compiled already."""
-        return [side.switch_to_compiled() for side in self.sides]
+    def switch_to_compiled(self) -> None:
+        """Replace flights by compiled ones, once ready; of the snapshots only the start is kept."""
+        if not self.is_compiling:
+            return
+        starts = [side.switch_to_compiled() for side in self.sides]
+        self.snapshots = KeptSnapshots()
+        if None not in starts:
+            self.snapshots.keep(0.0, tuple(start for start in starts if start is not None))
 
     @property
     def time(self) -> float:
@@ -267,17 +269,19 @@ class ComparedFlights:
     def fork(self) -> None:
         """Fly a second flight beside this one from here on, with the same noise, and let the controls act on it.
 
-        A second flight that there was already ends.
+        A second flight that there was already ends, and with it the snapshots of both together.
         """
         self.switch_to_compiled()
+        self.snapshots = KeptSnapshots() if len(self.sides) > 1 else self.snapshots
         self.sources, self.sides = [self.side.origin], [self.side, self.side.fork()]
         self.hand = 1
         self.note = f"forked at t = {self.time:g} s: the controls act on B"
 
     def join(self) -> None:
-        """End the comparison: the side that the controls act on flies on alone."""
+        """End the comparison: the side that the controls act on flies on alone, and goes back no further than here."""
         self.sources = [self.side.origin]
         self.sides, self.hand = [self.side], 0
+        self.snapshots = KeptSnapshots()
         self.note = ""
 
     def change(self, key: str, value: Any) -> None:
@@ -334,40 +338,6 @@ class ComparedFlights:
         self.switch_to_compiled()
         return replay(refly(self.flight)).save(path)
 
-
-MAX_BUSY_SECONDS = 0.05  # s of real time flown at most before the page is answered again
-
-
-class Player(ComparedFlights):
-    """Flights that are played: the model behind a page and its controls.
-
-    `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
-
-    Attributes: clock, how fast they fly; snapshots, to go back to; is_paused; failure_message, why
-    they stopped, or nothing.
-    """
-
-    def __init__(self, request: FlightRequest):
-        self.clock, self.is_paused, self.failure_message = PageClock(1.0), False, ""
-        self._steps_per_second = 1e4  # motion steps per second, as measured
-        self._asked = ActionQueue()
-        super().__init__(request)
-
-    def _open(self, place_agents: bool = False) -> None:
-        super()._open(place_agents)
-        self.clock = PageClock(self.preset.flight.dt, self.clock.speed)
-        self.snapshots, self.failure_message = KeptSnapshots(), ""
-
-    def switch_to_compiled(self) -> list[Snapshot | None]:
-        """Replace flights by compiled ones, once ready; of the snapshots only the start is kept."""
-        if not self.is_compiling:
-            return []
-        starts = super().switch_to_compiled()
-        self.snapshots = KeptSnapshots()
-        if None not in starts:
-            self.snapshots.keep(0.0, tuple(start for start in starts if start is not None))
-        return starts
-
     @property
     def status(self) -> str:
         """Message while the page waits, or the reason why it stopped; empty otherwise."""
@@ -392,7 +362,7 @@ class Player(ComparedFlights):
 
     def run_actions_within(self, seconds: float) -> bool:
         """Wait some seconds of real time, or until an action ran. Return True if one ran."""
-        return self._asked.wait(seconds) and self._asked.answer(self._safely)
+        return self._asked.answer(self._safely, seconds)
 
     def tick(self, elapsed: float) -> bool:
         """Run queued actions, then fly the steps due after `elapsed` s of real time. Return True if anything
@@ -487,14 +457,3 @@ class Player(ComparedFlights):
         self.snapshots.forget_after(time + 1e-6)
         least = "; no earlier moment is kept" if self.time > time + 1e-6 and not failed else ""
         self.failure_message, self.note, self.is_paused = "", f"back at t = {self.time:g} s{least}", True
-
-    def fork(self) -> None:
-        """Fly a second flight beside this one from here on; of two, moments of both together are given up."""
-        two = len(self.sides) > 1
-        super().fork()
-        self.snapshots = KeptSnapshots() if two else self.snapshots
-
-    def join(self) -> None:
-        """End the comparison: the side that the controls act on flies on alone, and goes back no further than here."""
-        super().join()
-        self.snapshots = KeptSnapshots()
