@@ -16,7 +16,7 @@ from viser import uplot
 from airflock.studio.access_token import require_token
 from airflock.studio.flight_pane import ParameterControl
 from airflock.support import StudioError
-from airflock.view import SceneLines, SceneSolid, agent_colours, dart_mesh
+from airflock.view import SceneLines, SceneSolid, agent_colours, dart_mesh, velocity_quaternions
 
 ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)  # times a power of ten
 PARTS_PER_SPAN = 4  # an axis ends within a part, so large, of the span that is shown
@@ -520,3 +520,88 @@ class Trails:
             self._view.trail(start_of(self._piece_start), position, colours, done)
         if self._piece_start is None or done:
             self._piece_start = position
+
+
+FOLLOW_NOTHING = "nothing"  # the first choice of what the camera follows; then all, then the selected one
+
+
+class AgentScene:
+    """Scene with agents, of a flight or of a fleet.
+
+    links, follow_choice : what its controls say; trails : behind the agents; size : of an agent, m
+    """
+
+    follow_choices: tuple[str, str, str]
+
+    def __init__(self, view: BrowserView, links: str):
+        self.view, self.links, self.follow_choice = view, links, FOLLOW_NOTHING
+        self.trails, self.size = Trails(view), 1.0
+
+    def draw_agents(
+        self, position: Positions, velocity: Positions, tone: NDArray[np.uint8], present: NDArray[np.bool_],
+        selected: int | None, start_of: Callable[[Positions], Positions],
+    ) -> None:  # fmt: skip
+        """Draw all agents and their trails, and let the camera follow those that are present; (agent, ...) each."""
+        trail = tone.copy()
+        if selected is not None:
+            tone[selected] = agent_colours.SELECTED_COLOUR
+        self.view.move(position, velocity_quaternions(velocity), tone)
+        self.trails.draw(position, trail, start_of)
+        _, everyone, one = self.follow_choices
+        if self.follow_choice == everyone and present.any():
+            self.view.follow(position[present].mean(axis=0).astype(float))
+        elif self.follow_choice == one and selected is not None and present[selected]:
+            self.view.follow(position[selected].astype(float))
+
+    def nearest_to_ray(self, position: Positions, origin: NDArray[Any], direction: NDArray[Any]) -> int | None:
+        """Return the agent nearest to a ray; None if none is near."""
+        away = position - origin
+        off = np.linalg.norm(away - np.maximum(away @ direction, 0.0)[:, None] * direction, axis=1)
+        best = int(off.argmin())
+        return best if off[best] < 2.0 * self.size else None
+
+
+def next_selected(chosen: int | None, count: int, number: int) -> int:
+    """Return the agent that is `count` on from the selected one, of a number of agents."""
+    return ((-1 if chosen is None and count > 0 else chosen or 0) + count) % number
+
+
+FRAMES_PER_SECOND = 30  # per second of real time
+CHARTS_PER_SECOND = 5  # per second
+
+
+class LivePage:
+    """Page of a view: call `run` to draw in real time until `stop` or Ctrl-C.
+
+    advance : goes on by some seconds of real time; True if anything moved
+    answer  : waits some seconds of real time, or until actions of controls ran; True if any ran
+    """
+
+    def __init__(self, view: BrowserView, advance: Callable[[float], bool], answer: Callable[[float], bool]):
+        self.view, self._advance, self._answer, self._is_running = view, advance, answer, True
+
+    def frame(self, refresh: bool) -> None:
+        """Draw the present moment, with charts, tables and words if `refresh`."""
+        raise NotImplementedError
+
+    def stop(self) -> None:
+        """End `run` after the frame at hand; from any thread."""
+        self._is_running = False
+
+    def run(self) -> None:
+        """Go on and draw in real time until the page is stopped."""
+        now = drawn = refreshed = time.perf_counter()
+        acted = False
+        while self._is_running:
+            last, now = now, time.perf_counter()
+            moved = self._advance(now - last)
+            refresh = now - refreshed >= 1.0 / CHARTS_PER_SECOND
+            if moved or acted or refresh:
+                self.frame(refresh)
+            refreshed = now if refresh else refreshed
+            # A late frame is not caught up: after a pause of the machine the page goes on at its
+            # usual rate.
+            drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
+            acted = self._answer(0.001)  # the threads of the page's server come first
+            while self._is_running and (left := drawn - time.perf_counter()) > 0.0:
+                acted = self._answer(left) or acted

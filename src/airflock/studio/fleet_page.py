@@ -15,12 +15,19 @@ from airflock.drones import HEARD_WITHIN, STANDING_PHASES, MissionPhase, Peer
 from airflock.fleets import INJECTED_KINDS, FleetObserver, scenario_fault_name
 from airflock.parts import FAULTS
 from airflock.studio import page_measures as measures
-from airflock.studio.browser_view import BrowserView, Trails
+from airflock.studio.browser_view import (
+    CHARTS_PER_SECOND,
+    FOLLOW_NOTHING,
+    AgentScene,
+    BrowserView,
+    LivePage,
+    next_selected,
+)
 from airflock.studio.flight_pane import ABSENT_HEIGHT, ABSENT_SPACING
 from airflock.studio.page_measures import MAX_CHART_POINTS, AgentPairs
 from airflock.studio.page_panels import small_print_html, status_html
 from airflock.studio.player import ActionQueue
-from airflock.view import AgentColours, agent_colours, card_scene, velocity_quaternions
+from airflock.view import AgentColours, agent_colours, card_scene
 
 MAX_NOTES = 14  # notes
 MAX_ROWS = 60  # drones that have a row of their own
@@ -150,27 +157,23 @@ FLEET_COLOURINGS = (
     "drone",
 )
 FLEET_LINK_CHOICES = ("packets that arrive", "three nearest", "none")
-FLEET_FOLLOW_CHOICES = ("nothing", "the fleet", "the selected drone")
+FLEET_FOLLOW_CHOICES = (FOLLOW_NOTHING, "the fleet", "the selected drone")
 DARTS_PER_HALF_WIDTH = 26.0  # darts in half the picture
 PANEL_OFFSET = np.array([0.2, 0.1, 0.0])  # half widths; the panel stands there
 ONE_WAY_GREY = 225  # grey of a link on which packets arrive one way only
 
 
-class FleetScene:
+class FleetScene(AgentScene):
     """Scene of a page that watches a fleet.
 
-    way, links, follow : what its controls say; trails : behind the drones
-    shown : the last shade, whose key stands on the page
+    colouring : what its control says; shown : the last shade, whose key stands on the page
     """
 
+    follow_choices = FLEET_FOLLOW_CHOICES
+
     def __init__(self, observer: FleetObserver, view: BrowserView):
-        self.observer, self.view = observer, view
-        self.colouring, self.links, self.follow_choice, self.trails = (
-            FLEET_COLOURINGS[0],
-            FLEET_LINK_CHOICES[0],
-            FLEET_FOLLOW_CHOICES[0],
-            Trails(view),
-        )
+        super().__init__(view, FLEET_LINK_CHOICES[0])
+        self.observer, self.colouring = observer, FLEET_COLOURINGS[0]
         self.members = observer.card.members
         self.field = card_scene(observer.card)
         self.size = self.field.span * min(1.0, (100.0 / len(self.members)) ** 0.25) / DARTS_PER_HALF_WIDTH
@@ -197,18 +200,11 @@ class FleetScene:
         tone = self.shown.colours
         # Silent drones turn grey in every colouring, so that they cannot be overlooked.
         tone[self._silent(now)] = agent_colours.NO_VALUE_COLOUR
-        trail = tone.copy()
-        if selected is not None:
-            tone[selected] = agent_colours.SELECTED_COLOUR
-        self.view.move(position, velocity_quaternions(velocity), tone)
-        self.trails.draw(
-            position, trail, lambda before: np.where((before[:, 2] <= 0.5 * ABSENT_HEIGHT)[:, None], position, before)
-        )
+        self.draw_agents(
+            position, velocity, tone, known, selected,
+            lambda before: np.where((before[:, 2] <= 0.5 * ABSENT_HEIGHT)[:, None], position, before),
+        )  # fmt: skip
         self._lines(now, position, known, selected)
-        if self.follow_choice == FLEET_FOLLOW_CHOICES[1] and known.any():
-            self.view.follow(position[known].mean(axis=0).astype(float))
-        elif self.follow_choice == FLEET_FOLLOW_CHOICES[2] and selected is not None and known[selected]:
-            self.view.follow(position[selected].astype(float))
 
     def positions(self, now: float) -> NDArray[np.float64]:
         """Return the positions of all members (drone, 3), m; drones never heard lie far below."""
@@ -284,12 +280,8 @@ def _with_nan(values: list[int | None]) -> NDArray[np.float64]:
     return np.array([np.nan if value is None else value for value in values], float)
 
 
-FRAMES_PER_SECOND = 30  # per second
-CHARTS_PER_SECOND = 5  # per second
-
-
-class FleetPage:
-    """One page: call `run` to listen and draw until `stop` or Ctrl-C.
+class FleetPage(LivePage):
+    """Page that listens to a fleet.
 
     observer : of the fleet; listen : gives the datagrams that have arrived; clock : the own clock of both, s
     """
@@ -298,8 +290,9 @@ class FleetPage:
         self, observer: FleetObserver, view: BrowserView, read_datagrams: Callable[[], Iterable[bytes]],
         clock: Callable[[], float] = time.monotonic,
     ):  # fmt: skip
-        self.observer, self.view, self._read_datagrams, self._clock = observer, view, read_datagrams, clock
-        self._is_running, self._asked = True, ActionQueue()
+        self._asked = ActionQueue()
+        super().__init__(view, self._listen, lambda seconds: self._asked.answer(lambda action: action(), seconds))
+        self.observer, self._read_datagrams, self._clock = observer, read_datagrams, clock
         self.chosen: int | None = None  # place of the selected drone among the members
         self.scene = drawing = FleetScene(observer, view)
         panel = view.panel
@@ -348,24 +341,11 @@ class FleetPage:
         """Queue an action for the next frame; from any thread."""
         self._asked.put(action)
 
-    def stop(self) -> None:
-        """End `run` after the frame at hand; from any thread."""
-        self._is_running = False
-
-    def run(self) -> None:
-        """Listen and draw in real time until the page is stopped."""
-        drawn = refreshed = self._clock()
-        while self._is_running:
-            now = self._clock()
-            for datagram in self._read_datagrams():
-                self.observer.take(datagram, now)
-            refresh = now - refreshed >= 1.0 / CHARTS_PER_SECOND
-            refreshed = now if refresh else refreshed
-            self.frame(refresh)
-            drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
-            # At least a millisecond: the threads of the page server need the interpreter as well.
-            self._asked.wait(max(drawn - self._clock(), 0.001))
-            self._asked.answer(lambda action: action())
+    def _listen(self, _: float) -> bool:
+        """Take what was heard; drones are carried on between their packets, so that something always moves."""
+        for datagram in self._read_datagrams():
+            self.observer.take(datagram, self._clock())
+        return True
 
     def frame(self, refresh: bool) -> None:
         """Draw the present moment, with charts, tables and words if `refresh`."""
@@ -383,15 +363,11 @@ class FleetPage:
 
     def select_next(self, count: int) -> None:
         """Select a drone some indices on."""
-        now = -1 if self.chosen is None and count > 0 else self.chosen or 0
-        self.select((now + count) % len(self.observer.card.members))
+        self.select(next_selected(self.chosen, count, len(self.observer.card.members)))
 
     def _clicked(self, origin: NDArray[Any], direction: NDArray[Any]) -> None:
         """Select the drone nearest to a ray, if it is near."""
-        away = self.scene.positions(self._clock()) - origin
-        off = np.linalg.norm(away - np.maximum(away @ direction, 0.0)[:, None] * direction, axis=1)
-        best = int(off.argmin())
-        self.select(best if off[best] < 2.0 * self.scene.size else None)
+        self.select(self.scene.nearest_to_ray(self.scene.positions(self._clock()), origin, direction))
 
     def _show_status(self, now: float) -> None:
         card, observer = self.observer.card, self.observer

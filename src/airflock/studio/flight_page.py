@@ -1,13 +1,12 @@
 """Flight page: the player's flights on a view, frame by frame. Its panels hold the controls and the measures."""
 
 import html
-import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.studio.browser_view import BrowserView
+from airflock.studio.browser_view import BrowserView, LivePage
 from airflock.studio.page_panels import (
     ActionPanel,
     ComparisonPanel,
@@ -22,16 +21,12 @@ from airflock.studio.page_panels import (
 from airflock.studio.page_scene import PageScene
 from airflock.studio.player import Player
 
-FRAMES_PER_SECOND = 30  # per second of real time
-CHARTS_PER_SECOND = 5  # per second
-
-
-class FlightPage:
-    """One page: call `run` to fly until `stop` or Ctrl-C."""
+class FlightPage(LivePage):
+    """Page that flies the flights of a player."""
 
     def __init__(self, player: Player, view: BrowserView):
-        self.player, self.view = player, view
-        self._is_running = True
+        super().__init__(view, player.tick, player.run_actions_within)
+        self.player = player
         self.scene = PageScene(player, view)
         panel = view.panel
         self.title, self.warning_text = panel.text(), panel.text()
@@ -47,45 +42,13 @@ class FlightPage:
         with compare:
             self.comparison = ComparisonPanel(self, compare)
         self.panels: list[PagePanel] = [
-            self.playback,
-            self.selection,
-            self.actions,
-            self.open_panel,
-            self.tuning,
-            self.measurement,
+            self.playback, self.selection, self.actions, self.open_panel, self.tuning, self.measurement,
             self.comparison,
-        ]
+        ]  # fmt: skip
         for room in self.panels:
             room.rebuild()
         self.frame(True)
         view.on_click(lambda origin, way: player.ask(lambda: self._clicked(origin, way)))
-
-    def stop(self) -> None:
-        """End `run` after the frame at hand; from any thread."""
-        self._is_running = False
-
-    def run(self) -> None:
-        """Fly and draw in real time until the page is stopped."""
-        now = drawn = refreshed = time.perf_counter()
-        acted = False
-        while self._is_running:
-            last, now = now, time.perf_counter()
-            moved = self.player.tick(now - last)
-            refresh = now - refreshed >= 1.0 / CHARTS_PER_SECOND
-            if moved or acted or refresh:
-                self.frame(refresh)
-            refreshed = now if refresh else refreshed
-            # A late frame is not caught up: after a pause of the machine the page goes on at its
-            # usual rate.
-            drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
-            acted = self._run_actions_until(drawn)
-
-    def _run_actions_until(self, end: float) -> bool:
-        """Run the actions of controls at once, until the next frame is due. Return True if any ran."""
-        acted = self.player.run_actions_within(0.001)  # the threads of the page's server come first
-        while self._is_running and (left := end - time.perf_counter()) > 0.0:
-            acted = self.player.run_actions_within(left) or acted
-        return acted
 
     def rebuild(self) -> None:
         """Draw and list everything again, for other flights than before."""

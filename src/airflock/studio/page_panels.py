@@ -24,6 +24,7 @@ from airflock.scenarios import (
 )
 from airflock.search import shipped_study_axes
 from airflock.studio import page_measures as measures
+from airflock.studio.browser_view import next_selected
 from airflock.studio.flight_pane import (
     FlightPane,
     ParameterControl,
@@ -966,16 +967,11 @@ class SelectionPanel(PagePanel):
 
     def select_next(self, count: int) -> None:
         """Select an agent some numbers on."""
-        many = len(self.scene.positions)
-        self.select(((-1 if self.chosen is None and count > 0 else self.chosen or 0) + count) % many)
+        self.select(next_selected(self.chosen, count, len(self.scene.positions)))
 
     def at(self, origin: NDArray[Any], direction: NDArray[Any]) -> None:
         """Select the agent nearest to a ray, if it is near."""
-        away = self.scene.positions - origin
-        along = np.maximum(away @ direction, 0.0)
-        off = np.linalg.norm(away - along[:, None] * direction, axis=1)
-        best = int(off.argmin())
-        self.select(best if off[best] < 2.0 * self.scene.size else None)
+        self.select(self.scene.nearest_to_ray(self.scene.positions, origin, direction))
 
     def push(self) -> None:
         """Push the selected agent, at twice the flock's speed."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from airflock.core import Radio, arrival_probability
 from airflock.parts.metrics import scalar_names
 from airflock.studio import page_measures as measures
-from airflock.studio.browser_view import BrowserView, Trails
+from airflock.studio.browser_view import FOLLOW_NOTHING, AgentScene, BrowserView
 from airflock.studio.flight_pane import ABSENT_HEIGHT, FlightPane
 from airflock.studio.player import Player
 from airflock.view import (
@@ -24,7 +24,6 @@ from airflock.view import (
     cluster_labels,
     scenario_geometry,
     varied_number_units,
-    velocity_quaternions,
 )
 
 MAX_KEPT = 2000  # collisions that are remembered; of more the latest
@@ -205,7 +204,7 @@ OPEN_WORLD_SECONDS = 8.0  # s; half of what is seen of an open world is at least
 DARTS_PER_HALF_WIDTH = 20.0  # a dart of a flock of a hundred is so many times smaller than half the picture
 TWO_PANE_SHARE = 0.8  # of the half width of two sides must fit the height of a page, which is broader than high
 PANE_DISTANCE = 2.3  # half widths between the middles of two sides
-FOLLOW_CHOICES = ("nothing", "the flock", "the selected agent")
+FOLLOW_CHOICES = (FOLLOW_NOTHING, "the flock", "the selected agent")
 LINK_CHOICES = ("none", "three nearest", "radio")
 PANE_NAMES = "AB"
 FLASH_FRAMES = 15  # frames for which a collision is shown
@@ -258,14 +257,14 @@ def arrival_curve(radio: Radio, k: Any) -> tuple[NDArray[Any], NDArray[Any]]:
     return far, np.array([arrival_probability(radio, k, r) for r in far.tolist()])
 
 
-class PageScene:
+class PageScene(AgentScene):
     """Scene of a page."""
 
+    follow_choices = FOLLOW_CHOICES
+
     def __init__(self, player: Player, view: BrowserView):
-        self.player, self.view = player, view
-        self.colouring, self.links, self.follow_choice = AgentColouring(), LINK_CHOICES[0], FOLLOW_CHOICES[0]
-        self.trails = Trails(view)
-        self.collisions = CollisionList()
+        super().__init__(view, LINK_CHOICES[0])
+        self.player, self.colouring, self.collisions = player, AgentColouring(), CollisionList()
         self.draw_handles: Any = None  # draws handles on goals that can be dragged: (player, drawing) → None
         self.rebuild()
 
@@ -355,16 +354,10 @@ class PageScene:
         self.top = max(self.top, 1.3 * usual if usual > self.top else 0.0)  # a start from rest says little
         tone = self.colouring.of(flocks, velocity, self.top, self.stages[0].height).colours
         self._flash(tone)
-        trail = tone.copy()
-        if selected is not None:
-            tone[selected] = agent_colours.SELECTED_COLOUR
-        self.view.move(position, velocity_quaternions(velocity), tone)
-        self.trails.draw(position, trail, lambda before: self._trail_starts(before, position))
         there = np.concatenate([flock.side.flight.present for flock in flocks])
-        if self.follow_choice == FOLLOW_CHOICES[1] and there.any():
-            self.view.follow(position[there].mean(axis=0).astype(float))
-        elif self.follow_choice == FOLLOW_CHOICES[2] and selected is not None and there[selected]:
-            self.view.follow(position[selected].astype(float))
+        self.draw_agents(
+            position, velocity, tone, there, selected, lambda before: self._trail_starts(before, position)
+        )
         links = [flock.links(self.links) for flock in flocks]
         self.view.extra("links", np.vstack([points for points, _ in links]), np.vstack([tones for _, tones in links]))
 
