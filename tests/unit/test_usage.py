@@ -9,6 +9,7 @@ import pytest
 from typer.main import get_command
 
 import airflock
+from airflock.cli.command import VERBS
 from airflock.cli.flight_verbs import merge_similar_notes
 from airflock.cli.main import app, main
 from airflock.recordings.sweeps import metric_to_show
@@ -203,3 +204,16 @@ def test_what_is_no_number_is_refused_in_python_too(ours, tmp_path):
     ):
         with pytest.raises(AirflockError, match=f"{ours:g}"):
             call()
+
+
+def test_to_resume_nothing_is_refused_by_every_command_that_can_resume(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    resuming = [name for name, verb in VERBS.items() if "resume" in verb.options]
+    assert {"sweep", "evolve", "certify", "tune"} <= {*resuming}
+    for name in resuming:
+        monkeypatch.setattr("sys.argv", ["airflock", name, "--resume"])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        lines = capsys.readouterr().err
+        assert ended.value.code == 2 and lines.startswith("airflock: ") and "unexpected" not in lines, (name, lines)
+    assert not list(tmp_path.iterdir())

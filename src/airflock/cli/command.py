@@ -13,6 +13,7 @@ import typer
 import typer.main
 from typer.core import TyperCommand, TyperGroup
 
+from airflock import recordings
 from airflock.cli.options import ALIASES, Option, completion_of, read_declaration, shared_options
 from airflock.support import INVALID, AirflockError, ErrorCollector, suggest
 
@@ -221,9 +222,7 @@ class VerbCommand(TyperCommand):
         for parameter in self.params:
             text = self.options[parameter.name].help
             if FORMATS in text:  # each time anew: a format may have joined since the last help
-                from airflock.recordings import format_words
-
-                parameter.help = text.replace(FORMATS, format_words())
+                parameter.help = text.replace(FORMATS, recordings.format_words())
         super().format_help(ctx, formatter)
 
     @cached_property

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import typer
 
+from airflock import core, drones, fleets, recordings
 from airflock.cli import options, terminal
 from airflock.cli.command import GroupOfVerbs, verb
 from airflock.cli.terminal import counting_parts
@@ -42,22 +43,19 @@ def fleet(o: SimpleNamespace, errors: ErrorCollector) -> None:
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
     and beside it airflock watch fleet.json
     """
-    from airflock.fleets import SECONDS_BEFORE_START, compare, flying
-
-    live, beside = o.mode not in (flying.LOCKSTEP_MODE, INVALID), o.beside is not None
+    live, beside = o.mode not in (fleets.flying.LOCKSTEP_MODE, INVALID), o.beside is not None
     errors.read(options.check_writable, (o.save, RECORDINGS), (o.card, (".json",)))
     settings = options.collect_settings(errors, o)
-    settings = errors.read(
-        flying.vehicle_body, o.scenario, settings, value_or_default(o.vehicle, ""), value_or_default(o.body, None)
-    )
+    vehicle, body = value_or_default(o.vehicle, ""), value_or_default(o.body, None)
+    settings = errors.read(fleets.flying.vehicle_body, o.scenario, settings, vehicle, body)
     loaded = options.collect_scenario(errors, o.scenario, settings, trust=o.trust)
     loaded = errors.read(
-        lambda found: compare.with_metric_period(found, found.sensors.period or found.flight.dt), loaded
+        lambda found: fleets.compare.with_metric_period(found, found.sensors.period or found.flight.dt), loaded
     )
     numbers = errors.read(options.seeds_from, o.first_seed, o.seeds)
     members = errors.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
     broken = errors.read(_broken, o.faults, value_or_default(members, ALL_SYSTEM_IDS), live)
-    if o.card is not None and o.mode == flying.LOCKSTEP_MODE:
+    if o.card is not None and o.mode == fleets.flying.LOCKSTEP_MODE:
         errors.note(f"--card {o.card}: in lock-step it flies too fast to watch; add --mode tasks or processes")
     if o.beside not in (None, "simulator"):
         errors.note(f"--against {o.beside}: only simulator is known")
@@ -67,11 +65,11 @@ def fleet(o: SimpleNamespace, errors: ErrorCollector) -> None:
     how: dict[str, Any] = {name: getattr(o, name) for name in ("vehicle", "mode", "join")}
     how |= {"from_ground": o.ground, "card_file": o.card}
     how["stop_for_lost"] = True if o.silence is None and not beside else o.silence
-    series = flying.FleetRuns(loaded, o.vehicle)
-    ticks = o.seeds * int(loaded.flight.duration + (SECONDS_BEFORE_START if o.ground else 0.0))
+    series = fleets.flying.FleetRuns(loaded, o.vehicle)
+    ticks = o.seeds * int(loaded.flight.duration + (fleets.SECONDS_BEFORE_START if o.ground else 0.0))
     with counting_parts(f"{loaded.name}: fleet", ticks, quiet=o.json) as done, _frozen_imports():
         how |= {"on_done": done, "notify": terminal.print_message}
-        for flown in flying.fly_seeds(loaded, numbers, faults=broken, **how):
+        for flown in fleets.flying.fly_seeds(loaded, numbers, faults=broken, **how):
             series.add(flown, with_simulator=beside, starts_alike=not o.ground and not live)
             if o.save is not None:
                 _save(options.file_of_seed(o.save, flown.seed, numbers), flown)
@@ -80,10 +78,8 @@ def fleet(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
 def _broken(file: Path | None, members: tuple[int, ...], live: bool) -> Sequence[Any]:
     """Return the faults of a file, if there is one, that such a fleet can simulate."""
-    from airflock.fleets import read_injected_faults, realtime
-
-    found = () if file is None else read_injected_faults(file, members)
-    options.raise_errors(realtime.lockstep_only_errors(found) if live else [])
+    found = () if file is None else fleets.read_injected_faults(file, members)
+    options.raise_errors(fleets.realtime.lockstep_only_errors(found) if live else [])
     return found
 
 
@@ -104,10 +100,8 @@ def _frozen_imports() -> Iterator[None]:
 
 
 def _save(path: Path, flown: Any) -> None:
-    from airflock.fleets import fleet_recording
-    from airflock.recordings import save as save_recording
 
-    terminal.print_message(f"saved {save_recording(fleet_recording(flown), path)}")
+    terminal.print_message(f"saved {recordings.save(fleets.fleet_recording(flown), path)}")
 
 
 def _print_runs(series: Any, as_json: bool) -> None:
@@ -225,19 +219,16 @@ def prepare(
     """
     import secrets
 
-    from airflock.drones import card_hash, new_operator_keys, parse_card
-    from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes, site_notes
-
     where, systems = errors.read(options.parse_position, "--site", site), errors.read(_members, members)
     errors.read(options.check_writable, (out, (".json",)))
     files = MissionFiles(out, out.with_suffix(".key"), out.with_suffix(".operator"))
     errors.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
     loaded = options.collect_scenario(errors, scenario, errors.read(options.parse_settings, settings), trust=trust)
     safety = _limits(limit, loaded, errors)
-    private, public = new_operator_keys()
+    private, public = drones.new_operator_keys()
 
     def card_for(scenario: Any) -> dict[str, Any]:
-        made = make_card_document(
+        made = fleets.make_card_document(
             scenario,
             site=value_or_default(where, DEFAULT_SITE),
             members=value_or_default(systems, [1]),
@@ -246,19 +237,19 @@ def prepare(
             operator=public,
             autopilot=autopilot,
             height=value_or_default(height, None),
-            margin=value_or_default(margin, DEFAULT_FENCE_MARGIN),
+            margin=value_or_default(margin, fleets.DEFAULT_FENCE_MARGIN),
             safety=safety,
         )
-        parse_card({**made, "hash": card_hash(made)}, str(out))
+        drones.parse_card({**made, "hash": drones.card_hash(made)}, str(out))
         return made
 
-    moved = errors.read(site_notes, loaded, where, move_field=move_field)
+    moved = errors.read(fleets.site_notes, loaded, where, move_field=move_field)
     document = errors.read(card_for, loaded)
     loads = errors.read(_check_airtimes, systems, document, fast_bits, slow_bits)
     errors.raise_errors()
     card = _write_mission(files, document, private)
-    beside = deviation_notes(loaded, card.safety, len(card.members))
-    terminal.print_notes([*loaded.notes, *omission_notes(loaded), *beside, *moved])
+    beside = fleets.deviation_notes(loaded, card.safety, len(card.members))
+    terminal.print_notes([*loaded.notes, *fleets.omission_notes(loaded), *beside, *moved])
     if json:
         radio = {each.radio: each.share for each in loads}
         terminal.print_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})
@@ -312,16 +303,12 @@ def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, s
 
 def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> dict[str, Any]:
     """Return the limits of the card that --limit changes; errors are noted, and their limits left out."""
-    from airflock.core import declarations
-    from airflock.drones import SafetyLimits
-    from airflock.fleets import default_safety
-
-    known = [name for name, _, _ in declarations(SafetyLimits)]
+    known = [name for name, _, _ in core.declarations(drones.SafetyLimits)]
     safety = value_or_default(errors.read(options.parse_settings, pairs, option="--limit"), {})
     wrong = [name for name in safety if name not in known]
     errors.note(*(f"--limit {name}: is not a limit; {suggest(name, known, ', '.join(known))}" for name in wrong))
     safety = {name: value for name, value in safety.items() if name in known}
-    changed = errors.read(lambda flown: replace(default_safety(flown), **safety), scenario)
+    changed = errors.read(lambda flown: replace(fleets.default_safety(flown), **safety), scenario)
     return {} if changed is INVALID else safety
 
 
@@ -329,12 +316,10 @@ def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes
     """Write card and keys, all of them or none; private: the operator's key. Return the written card."""
     import secrets
 
-    from airflock.drones import write_card, write_key
-
     try:
-        card = write_card(files.card, document)
-        write_key(files.key, secrets.token_bytes(32))
-        write_key(files.operator, private)
+        card = drones.write_card(files.card, document)
+        drones.write_key(files.key, secrets.token_bytes(32))
+        drones.write_key(files.operator, private)
     # All files or none.
     except BaseException:  # a full disk, Ctrl-C: a card without its keys is of no use
         for path in files:
@@ -404,37 +389,33 @@ def order(
     confirm : bool
         Second step of a kill, within 5 s of the first.
     """
-    from airflock.drones import PacketSigner, check_port, orders, read_card, read_key
-
     errors = ErrorCollector()
-    what = orders.OrderKind.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
+    what = drones.orders.OrderKind.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
     if what is None or do == "confirm_kill":
         errors.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
     if (do == "goto") != (point is not None):
         errors.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
     where = errors.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
-    card = errors.read(read_card, card_file)
+    card = errors.read(drones.read_card, card_file)
     errors.read(_check_target, card, target)
     if point:
         errors.read(_check_inside_fence, card, where, point)
-    key = errors.read(read_key, card_file.with_suffix(".key"))
-    private = errors.read(read_key, card_file.with_suffix(".operator"))
-    errors.read(check_port, radio)
+    key = errors.read(drones.read_key, card_file.with_suffix(".key"))
+    private = errors.read(drones.read_key, card_file.with_suffix(".operator"))
+    errors.read(drones.check_port, radio)
     errors.raise_errors()
     assert what is not None
     utc = time.time_ns() // 1000
     place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
-    command = orders.OperatorOrder(what, target, card.mission, utc, utc + round(in_ * 1e6), place)
-    _send(radio, orders.order_message(command, private), PacketSigner(key, orders.OPERATOR_SYSTEM))
-    effect = KILL_NOTE if what is orders.OrderKind.KILL else ""
+    command = drones.orders.OperatorOrder(what, target, card.mission, utc, utc + round(in_ * 1e6), place)
+    _send(radio, drones.orders.order_message(command, private), drones.PacketSigner(key, drones.orders.OPERATOR_SYSTEM))
+    effect = KILL_NOTE if what is drones.orders.OrderKind.KILL else ""
     terminal.print_message(f"sent {what.name} to {f'drone {target}' if target else 'all'}{effect}")
 
 
 def _send(radio: str, message: Any, sign: Any) -> None:
     """Send an order five times; raises CardError where the port cannot."""
-    from airflock.drones import open_port
-
-    port = open_port(radio)
+    port = drones.open_port(radio)
     try:
         for _ in range(5):
             if not port.write(sign(message, time.time_ns() // 1000)):
@@ -491,9 +472,7 @@ fly_app = typer.Typer(
 )
 def run_node(ctx: typer.Context) -> None:
     """Run a node, as python -m airflock.drones.onboard CARD ... does; `airflock fly card --help` lists its options."""
-    from airflock.drones import main
-
-    raise typer.Exit(main(ctx.args))
+    raise typer.Exit(drones.main(ctx.args))
 
 
 SPAN_GAP = 2.0  # s; ticks that differ are reported together unless so many agree between them
@@ -512,13 +491,11 @@ def replay(card_file: Path, log: Path, *, json: bool = False) -> None:
     log : path (LOG)
         Log of a node.
     """
-    from airflock.drones import code_version, read_card, read_key, replay_log_file
-
-    card, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
-    ticks, notes, version, phases = 0, [], code_version(), ("", "")
+    card, key = drones.read_card(card_file), drones.read_key(card_file.with_suffix(".key"))
+    ticks, notes, version, phases = 0, [], drones.code_version(), ("", "")
     different: list[float] = []
     spans: list[tuple[float, float, int]] = []  # first and last time and number of ticks that differ
-    for tick in replay_log_file(log, card, key):
+    for tick in drones.replay_log_file(log, card, key):
         ticks, version = ticks + 1, tick.version or "an earlier one"
         notes += [(tick.time, note) for note in tick.out.notes]
         before, phases = phases, (str(tick.entry.get("phase")), tick.phase.name)
@@ -529,7 +506,8 @@ def replay(card_file: Path, log: Path, *, json: bool = False) -> None:
             goes_on = bool(spans) and tick.time - spans[-1][1] <= SPAN_GAP
             begin, _, count = spans.pop() if goes_on else (tick.time, tick.time, 0)
             spans.append((begin, tick.time, count + 1))
-    other = "" if version == code_version() else f"flown by another version ({version}; this is {code_version()})"
+    own = drones.code_version()
+    other = "" if version == own else f"flown by another version ({version}; this is {own})"
     if json:
         terminal.print_json({"ticks": ticks, "different": different, "another_version": other or None, "notes": notes})
     else:

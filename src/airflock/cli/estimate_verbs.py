@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
+from airflock import estimate, recordings, runs, scenarios, view
 from airflock.cli import options, terminal
 from airflock.cli.command import verb
 from airflock.cli.terminal import counting_parts, progress_line
@@ -47,8 +48,6 @@ def import_tracks(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock import drone*.csv --map t:=time_us*1e-6 --map x:=pos_e --map y:=pos_n --map id:=file --same-clock
     """
-    from airflock.recordings import load_tracks, save as save_recording
-
     errors.read(options.check_writable, (o.save, RECORDINGS), reads=o.source)
     columns = errors.read(parse_mapping, o.map)
     place = errors.read(_origin, o.origin)
@@ -57,8 +56,8 @@ def import_tracks(o: SimpleNamespace, errors: ErrorCollector) -> None:
     how = {key: value for key, value in vars(o).items() if key not in ("source", "save", "json")}
     how |= {"map": columns, "origin": place, "accept": o.accept or ()}
     with reading_progress(len(o.source), o.json) as done:
-        recording = load_tracks(o.source, **how, say=notes.append, done=done)
-    save_recording(recording, o.save)
+        recording = recordings.load_tracks(o.source, **how, say=notes.append, done=done)
+    recordings.save(recording, o.save)
     if o.json:
         sizes = {str(name): int(size) for name, size in recording.sizes.items()}
         about = {"saved": str(o.save), "sizes": sizes, "fps": recording.attrs["fps"], "notes": notes}
@@ -110,10 +109,8 @@ def export(o: SimpleNamespace) -> None:
 
     Example: airflock export flight.nc --out flight.csv
     """
-    from airflock.recordings import SUFFIXES, export as write, load_recording
-
-    options.check_writable((o.out, SUFFIXES), reads=[o.recording])
-    write(load_recording(o.recording), o.out, layout=o.layout)
+    options.check_writable((o.out, recordings.SUFFIXES), reads=[o.recording])
+    recordings.export(recordings.load_recording(o.recording), o.out, layout=o.layout)
     ned = "; x is north, as in PX4: airflock import --axes ned reads it" if o.layout == "px4" else ""
     terminal.print_message(f"saved {o.out}{ned}")
 
@@ -127,23 +124,20 @@ def identify(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock identify logs/*.ulg --heard heard.csv --like vasarhelyi_2018/real_6ms --out mine.toml
     """
-    from airflock.estimate import identify as find, read_heard
-    from airflock.recordings import ImportOptions
-    from airflock.scenarios import load
-
     errors.read(options.check_writable, (o.out, SCENARIOS), (o.plot, PICTURES), reads=[o.like, o.heard, *o.flight_logs])
-    scenario = errors.read(lambda: load(o.like, options.parse_settings(o.settings)))
+    scenario = errors.read(lambda: scenarios.load(o.like, options.parse_settings(o.settings)))
     columns = errors.read(parse_mapping, o.map)
     ground = errors.read(_span, o.standing)
-    packets = None if o.heard is None else errors.read(read_heard, o.heard)
+    packets = None if o.heard is None else errors.read(estimate.read_heard, o.heard)
     if o.conservative is not None and not 0.0 < o.conservative < 1.0:
         errors.note(f"--conservative {o.conservative:g} lies outside (0, 1); 0.95 is usual")
     errors.raise_errors()
     with reading_progress(len(o.flight_logs), o.json) as done:
         how = {name: getattr(o, name) for name in options.READ_OPTIONS.split()}
-        result = find(
+        result = estimate.identify(
             o.flight_logs, scenario, heard=packets, standing=ground, same_clock=o.same_clock,
-            options=ImportOptions(**how | {"map": columns}, done=done), accept=o.accept or (), begin=o.begin, end=o.end,
+            options=recordings.ImportOptions(**how | {"map": columns}, done=done), accept=o.accept or (),
+            begin=o.begin, end=o.end,
         )  # fmt: skip
     if o.out is not None and not result.settings():
         raise AirflockError(
@@ -151,14 +145,10 @@ def identify(o: SimpleNamespace, errors: ErrorCollector) -> None:
         )
     check = _checked(result, o.flights, o.json)
     if o.out is not None:
-        from airflock.runs import write_toml_file
-
-        write_toml_file(o.out, result.document(o.conservative, uncertain=o.uncertain))
+        runs.write_toml_file(o.out, result.document(o.conservative, uncertain=o.uncertain))
         terminal.print_message(f"saved {o.out}")
     if o.plot is not None:
-        from airflock.view import plot_identified
-
-        terminal.save_picture(plot_identified(result, check), o.plot)
+        terminal.save_picture(view.plot_identified(result, check), o.plot)
     if o.json:
         return terminal.print_json(_identified_json(result, check))
     for note in result.notes:
@@ -182,12 +172,11 @@ def _span(text: str | None) -> tuple[float, float] | None:
 
 def _checked(result: Any, flights: int, quiet: bool) -> Any:
     """Run the posterior check, if there is something to check."""
-    from airflock.estimate import check_against_logs
-
     if not flights or not result.settings():
         return None
     with counting_parts("check: flights", flights, quiet=quiet) as done:
-        return check_against_logs(result.scenario(), result.logs, flights, done, comparable=result.has_one_clock)
+        known = result.has_one_clock
+        return estimate.check_against_logs(result.scenario(), result.logs, flights, done, comparable=known)
 
 
 def _check_parts(check: Any, result: Any, flights: int) -> list[str]:
@@ -199,9 +188,7 @@ def _check_parts(check: Any, result: Any, flights: int) -> list[str]:
 
 def _card_parts(result: Any) -> list[str]:
     """Return lines of the test flights, each with the numbers that it would show."""
-    from airflock.estimate import flight_card
-
-    card = flight_card(result.like)
+    card = estimate.flight_card(result.like)
     lines = [f"test flights, {sum(part.seconds for part in card) / 60.0:.0f} min:"]
     for number, part in enumerate(card, 1):
         lacking = [key for key in part.keys if key not in result.numbers or not result.numbers[key].told]
@@ -211,15 +198,13 @@ def _card_parts(result: Any) -> list[str]:
 
 
 def _identified_json(result: Any, check: Any) -> dict[str, Any]:
-    from airflock.estimate import flight_card
-
     numbers = {
         key: {"like": n.like, "from": n.origin, "reason": n.reason}
         | {name: getattr(n, name) if n.told else None for name in ("value", "low", "high")}
         for key, n in result.numbers.items()
     }  # fmt: skip
     checks = {} if check is None else {k: {"log": o, "low": lo, "high": hi} for k, (o, lo, hi) in check.found.items()}
-    card = [part._asdict() for part in flight_card(result.like)]
+    card = [part._asdict() for part in estimate.flight_card(result.like)]
     return {
         "like": result.like.name, "numbers": numbers, "noise_of_log": result.log_noise, "check": checks, "plan": card,
         "notes": result.notes,
@@ -236,8 +221,6 @@ def infer(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock infer fish.nc --models couzin_2002,reynolds_1987,vicsek_1995 --out best.toml --plot forces.png
     """
-    from airflock.estimate import infer as find
-
     reads = [*o.models.split(","), *o.tracks]
     errors.read(options.check_writable, (o.out, SCENARIOS), (o.plot, PICTURES), reads=reads)
     settings = errors.read(options.parse_settings, o.settings)
@@ -247,18 +230,14 @@ def infer(o: SimpleNamespace, errors: ErrorCollector) -> None:
     errors.note(*(f"{path}: no such file" for path in o.tracks if not path.exists()))
     errors.raise_errors()
     with _fit_progress(o.json) as done:
-        result = find(
+        result = estimate.infer(
             o.tracks, laws, settings=settings, topologies=[kind.strip() for kind in o.topologies.split(",")],
             check=o.check, seed=o.seed, trust=o.trust, done=done,
         )  # fmt: skip
     if o.plot is not None:
-        from airflock.view import plot_inferred
-
-        terminal.save_picture(plot_inferred(result), o.plot)
+        terminal.save_picture(view.plot_inferred(result), o.plot)
     if o.out is not None and result.best is not None:
-        from airflock.runs import write_toml_file
-
-        write_toml_file(o.out, result.document())
+        runs.write_toml_file(o.out, result.document())
         terminal.print_message(f"saved {o.out}")
     if o.json:
         return terminal.print_json(_inferred_json(result))

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+from airflock import displays, engine, recordings, runs, scenarios, studio, support, view
 from airflock.cli import options, terminal
 from airflock.cli.command import verb
 from airflock.cli.terminal import counting_parts
@@ -42,9 +43,6 @@ def run(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
-    from airflock.engine import pick_device
-    from airflock.runs import score_scenarios
-
     errors.read(options.check_writable, (o.save, RECORDINGS), (o.plot, PICTURES))
     changed = options.collect_settings(errors, o)
     scenario = options.collect_scenario(errors, o.scenario, changed, o.law, trust=o.trust)
@@ -54,11 +52,11 @@ def run(o: SimpleNamespace, errors: ErrorCollector) -> None:
     terminal.print_notes(scenario.notes)
     flights = [scenario] * o.seeds
     if o.scheduler is None:
-        o.device = pick_device(flights, o.device, precision=o.precision, notify=terminal.print_message)
+        o.device = engine.pick_device(flights, o.device, precision=o.precision, notify=terminal.print_message)
         options.announce_run_time(flights, o.threads, o.device)
         options.compile_before_bar(scenario, o.precision, o.device)
     with counting_parts(f"{scenario.name}: flights", o.seeds, quiet=o.json) as done:
-        rows = score_scenarios(flights, numbers, on_done=done, **options.flying(o))
+        rows = runs.score_scenarios(flights, numbers, on_done=done, **options.flying(o))
     _print_scores(scenario, numbers, rows, changed, o.json)
     if o.save or o.plot:  # after the scores, which a full disk does not take away
         _record(scenario, numbers, o)
@@ -69,17 +67,14 @@ def _print_scores(
 ) -> None:
     """Print the scores of flights, beside the paper's; changed : keys that are not as in the file."""
     from airflock.parts.metrics import reported_values
-    from airflock.recordings import rare_event_notes, upper_probability_bound
 
     seeds = len(numbers)
     if as_json:
-        from airflock.recordings import to_plain_values
-
         runs = [{"seed": seed, **row} for seed, row in zip(numbers, rows, strict=True)]
-        bound = upper_probability_bound(sum(row.get("n_coll", 0.0) > 0.0 for row in rows), seeds)
+        bound = recordings.upper_probability_bound(sum(row.get("n_coll", 0.0) > 0.0 for row in rows), seeds)
         bounds = {"collision_bound": bound} if seeds > 1 and "n_coll" in rows[0] else {}
         result = {
-            "scenario": {"name": scenario.name, **to_plain_values(scenario.document)},
+            "scenario": {"name": scenario.name, **recordings.to_plain_values(scenario.document)},
             "seeds": seeds,
             "runs": runs,
         }
@@ -89,22 +84,18 @@ def _print_scores(
     title = f"{scenario.name}: {scenario.agents} agents, {scenario.flight.duration:g} s, {count}"
     published = {} if changed_keys else scenario.published
     terminal.print_score_table(title, rows, published, reported_values(scenario.metrics.rule))
-    for remark in rare_event_notes(rows, numbers):
+    for remark in recordings.rare_event_notes(rows, numbers):
         terminal.print_message(remark)
 
 
 def _record(scenario: Any, numbers: Sequence[int], o: SimpleNamespace) -> None:
     """Fly again with the trajectories kept (the same bits), and write the requested files."""
-    from airflock.recordings import save as save_recording, simulate
-
     for seed in numbers if o.save else numbers[:1]:
-        recording = simulate(scenario, seed, precision=o.precision, device=o.device)
+        recording = recordings.simulate(scenario, seed, precision=o.precision, device=o.device)
         if o.save:
-            terminal.print_message(f"saved {save_recording(recording, options.file_of_seed(o.save, seed, numbers))}")
+            terminal.print_message(f"saved {recordings.save(recording, options.file_of_seed(o.save, seed, numbers))}")
         if o.plot and seed == numbers[0]:
-            from airflock.view import trajectories
-
-            terminal.save_picture(trajectories(recording), o.plot)
+            terminal.save_picture(view.trajectories(recording), o.plot)
 
 
 FOR_SCENARIOS = "scenario_or_recording seeds threads precision device scheduler"
@@ -118,15 +109,11 @@ def score(o: SimpleNamespace) -> None:
 
     Example: airflock score fish.nc --body-length 0.04 --series course.csv
     """
-    from airflock.recordings import ReaderProcess
-
     options.check_writable((o.series, TABLES))
     files, changed = o.path, options.parse_settings(o.settings)
     if o.body_length is not None:
-        from airflock.recordings import body_length_settings
-
-        changed = body_length_settings(o.body_length) | changed
-    with ReaderProcess(files[0]) as first:  # another process opens it while this one imports
+        changed = recordings.body_length_settings(o.body_length) | changed
+    with recordings.ReaderProcess(files[0]) as first:  # another process opens it while this one imports
         sources = [first, *files[1:]]
         if o.groups:
             return _print_group_scores(sources, files, changed, o.trust, o.json)
@@ -141,13 +128,13 @@ def _print_group_scores(
 ) -> None:
     """Measure the groups of recordings, and print the results."""
     from airflock.parts.metrics import reported_values
-    from airflock.recordings import PAIR_METRICS, group_scores, load_recording, scenario_of_recording
 
     runs = []
     for source, path in zip(sources, files, strict=True):
-        recording = load_recording(source)
-        about = reported_values(scenario_of_recording(recording, changed, trust=trust).metrics.rule) | PAIR_METRICS
-        table = group_scores(recording, changed, trust=trust)
+        recording = recordings.load_recording(source)
+        rule = recordings.scenario_of_recording(recording, changed, trust=trust).metrics.rule
+        about = reported_values(rule) | recordings.PAIR_METRICS
+        table = recordings.group_scores(recording, changed, trust=trust)
         rows = {str(name): row.dropna().to_dict() for name, row in table.iterrows()}
         runs.append({"file": str(path), "groups": rows})
         if not as_json:
@@ -177,26 +164,15 @@ class MeasuredRecording(NamedTuple):
 def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: bool) -> MeasuredRecording:
     """Measure a recording; source : its path, or the Opening that reads it; changed : keys of how it is measured."""
     from airflock.parts.metrics import reported_values
-    from airflock.recordings import (
-        PRESENCE_METRICS,
-        between_frames_note,
-        load_recording,
-        measure_recording,
-        nearness_note,
-        power_settings,
-        recorded_faults,
-        scenario_of_recording,
-        undefined_metrics_of,
-    )
 
-    recording = load_recording(source)
-    settings = power_settings(recording, changed) if aero else changed
-    values, course = measure_recording(recording, settings, trust=trust)
-    scenario = scenario_of_recording(recording, settings, trust=trust)
-    untold = undefined_metrics_of(recording, scenario, settings)
-    notes = [nearness_note(recording, scenario, values), between_frames_note(recording, scenario)]
-    about = reported_values(scenario.metrics.rule) | PRESENCE_METRICS
-    return MeasuredRecording(path, values, course, about, recorded_faults(recording), untold, notes)
+    recording = recordings.load_recording(source)
+    settings = recordings.power_settings(recording, changed) if aero else changed
+    values, course = recordings.measure_recording(recording, settings, trust=trust)
+    scenario = recordings.scenario_of_recording(recording, settings, trust=trust)
+    untold = recordings.undefined_metrics_of(recording, scenario, settings)
+    notes = [recordings.nearness_note(recording, scenario, values), recordings.between_frames_note(recording, scenario)]
+    about = reported_values(scenario.metrics.rule) | recordings.PRESENCE_METRICS
+    return MeasuredRecording(path, values, course, about, recordings.recorded_faults(recording), untold, notes)
 
 
 def _save_series(measured: Sequence[MeasuredRecording], path: Path) -> None:
@@ -205,11 +181,9 @@ def _save_series(measured: Sequence[MeasuredRecording], path: Path) -> None:
 
     import pandas as pd
 
-    from airflock.support import atomic
-
     text = io.StringIO()
     pd.concat([each.score_series.assign(file=str(each.path)) for each in measured]).to_csv(text)
-    atomic.write_file(path, text.getvalue())
+    support.atomic.write_file(path, text.getvalue())
     terminal.print_message(f"saved {path}")
 
 
@@ -217,8 +191,6 @@ def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> Non
     """Print order parameters of recordings, faults of their agents, and order parameters that could not be
     measured.
     """
-    from airflock.recordings import faults_line, missing_lengths_note as told_unsaid
-
     rows = [each.values for each in measured]
     if as_json:
         runs = [
@@ -236,10 +208,10 @@ def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> Non
     terminal.print_score_table(", ".join(str(each.path) for each in measured), rows, {}, about)
     for each in measured:
         if each.faults:
-            terminal.print_message(f"{each.path}: {faults_line(each.faults)}")
+            terminal.print_message(f"{each.path}: {recordings.faults_line(each.faults)}")
     for each in measured:
         if each.unmeasured:
-            terminal.print_message(f"{each.path}: {told_unsaid(each.unmeasured)}")
+            terminal.print_message(f"{each.path}: {recordings.missing_lengths_note(each.unmeasured)}")
         for note in filter(None, each.notes):
             terminal.print_message(f"{each.path}: {note}")
 
@@ -255,22 +227,22 @@ def sweep(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
-    from airflock.recordings import fly_sweep, make_sweep, metric_to_show, resumed_sweep
-
     errors.read(options.check_writable, (o.table, TABLES), (o.plot, PICTURES))
     fixed = options.collect_settings(errors, o)
+    made: Any = None
     if o.scenario is None and (o.out is None or not o.resume):
         errors.note("sweep: give a scenario and --over, or --out DIR --resume")
     elif o.scenario is None:
-        made = errors.read(resumed_sweep, o.out, trust=o.trust, over=o.over, settings=fixed, law=o.law)
+        made = errors.read(recordings.resumed_sweep, o.out, trust=o.trust, over=o.over, settings=fixed, law=o.law)
     else:
         axes = _axes(o.over or [], o.plot, errors)
         numbers = errors.read(options.seeds_from, o.first_seed, o.seeds)
         seeds = value_or_default(numbers, [0])  # the rest of the sweep is checked although they are wrong
         # Where no axis could be read, that is said already; the rest is checked with a grid of one point.
         grid = axes or ({"duration": [1.0]} if o.over else {})
-        made = errors.read(make_sweep, o.scenario, grid, seeds, fixed, o.law, o.precision, o.device, trust=o.trust)
-    name = errors.read(lambda found: metric_to_show(o.show, found.scenarios), made) if o.scenario or o.resume else ""
+        how = fixed, o.law, o.precision, o.device
+        made = errors.read(recordings.make_sweep, o.scenario, grid, seeds, *how, trust=o.trust)
+    shown = errors.read(lambda found: recordings.metric_to_show(o.show, found.scenarios), made) if made else ""
     errors.read(options.check_flight_options, o.device, o.precision, o.scheduler)
     errors.raise_errors()
     terminal.print_notes(merge_similar_notes(dict.fromkeys(note for found in made.scenarios for note in found.notes)))
@@ -278,16 +250,16 @@ def sweep(o: SimpleNamespace, errors: ErrorCollector) -> None:
         options.announce_run_time([found for found in made.scenarios for _ in made.seeds], o.threads, o.device)
         options.compile_before_bar(made.scenarios[0], made.precision, o.device)
     with counting_parts(f"{made.scenario.name}: flights", len(made.points) * len(made.seeds), quiet=o.json) as done:
-        tidy = fly_sweep(
+        tidy = recordings.fly_sweep(
             made, out=o.out, resume=o.resume, threads=o.threads, on_done=done, scheduler=o.scheduler,
             notify=terminal.print_message,
         )  # fmt: skip
-    _keep(tidy, list(made.over), name, made.scenarios[0], o)
+    _keep(tidy, list(made.over), shown, made.scenarios[0], o)
     if o.json:
         about = {"scenario": made.scenario.name, "seeds": len(made.seeds)}
         terminal.print_json({**about, "runs": tidy.to_dict("records")})
     else:
-        _print_sweep(tidy, list(made.over), name)
+        _print_sweep(tidy, list(made.over), shown)
 
 
 def _axes(over: list[str], plot: Path | None, errors: ErrorCollector) -> dict[str, list[Any]]:
@@ -308,14 +280,10 @@ def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
 def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, o: SimpleNamespace) -> None:
     """Write the requested table and picture."""
     if o.table is not None:
-        from airflock.support import atomic
-
-        atomic.write_file(o.table, tidy.to_csv(index=False))
+        support.atomic.write_file(o.table, tidy.to_csv(index=False))
         terminal.print_message(f"saved {o.table}")
     if o.plot is not None:
-        from airflock.view import heatmap
-
-        terminal.save_picture(heatmap(tidy, keys, show, scenario=scenario), o.plot)
+        terminal.save_picture(view.heatmap(tidy, keys, show, scenario=scenario), o.plot)
 
 
 def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
@@ -380,17 +348,15 @@ def plot(o: SimpleNamespace) -> None:
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
     options.check_writable((o.out, PICTURES))
-    from airflock.scenarios import load
-    from airflock.view import plot as picture
 
     settings = options.parse_settings(o.settings, o.agents, o.duration)
     window: dict[str, Any] = {"start": o.start, "stop": o.stop}
     if o.source.lower().endswith(".nc"):
-        figure = picture(o.source, o.kind, settings=settings, law=o.law, trust=o.trust, **window)
+        figure = view.plot(o.source, o.kind, settings=settings, law=o.law, trust=o.trust, **window)
     else:
-        scenario = load(o.source, settings, o.law, trust=o.trust)
+        scenario = scenarios.load(o.source, settings, o.law, trust=o.trust)
         terminal.print_notes(scenario.notes)
-        figure = picture(scenario, o.kind, seed=o.seed, **window)
+        figure = view.plot(scenario, o.kind, seed=o.seed, **window)
     terminal.save_picture(figure, o.out)
 
 
@@ -401,18 +367,16 @@ def video(o: SimpleNamespace) -> None:
     Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
     options.check_writable((o.out, VIDEOS))
-    from airflock.recordings import time_series_names
-    from airflock.view import check_chart, frame_count, import_ffmpeg, naming_file, video as make_video
 
     def check(scenario: Any) -> None:
-        check_chart(o.chart, time_series_names(scenario) if o.chart else [], scenario.name)
+        view.check_chart(o.chart, recordings.time_series_names(scenario) if o.chart else [], scenario.name)
 
-    import_ffmpeg()  # before anything flies, as all that can be refused
+    view.import_ffmpeg()  # before anything flies, as all that can be refused
     recording = _recording(o, check)
     names = ("fps", "speed", "start", "stop")
     choice = {name: getattr(o, name) for name in names}
-    with naming_file(o.source), counting_parts("pictures", frame_count(recording, **choice)) as done:
-        make_video(recording, o.out, done=done, space=o.space, chart=o.chart, tail=o.tail, height=o.height, **choice)
+    with view.naming_file(o.source), counting_parts("pictures", view.frame_count(recording, **choice)) as done:
+        view.video(recording, o.out, done=done, space=o.space, chart=o.chart, tail=o.tail, height=o.height, **choice)
     terminal.print_message(f"saved {o.out}")
 
 
@@ -423,27 +387,23 @@ def replay(o: SimpleNamespace) -> None:
     Example: airflock replay flight.nc --html show.html --colour cluster
     """
     options.check_writable((o.out, PAGES))
-    from airflock.view import check_colour, naming_file, replay as make_replay
 
-    recording = _recording(o, lambda scenario: check_colour(scenario, o.colour))
-    with naming_file(o.source):
-        page = make_replay(recording, rate=o.rate, colour=o.colour)
+    recording = _recording(o, lambda scenario: view.check_colour(scenario, o.colour))
+    with view.naming_file(o.source):
+        page = view.replay(recording, rate=o.rate, colour=o.colour)
     page.save(o.out)
     terminal.print_message(f"saved {o.out} ({len(page.text) / 1e6:.1f} MB)")
 
 
 def _recording(o: SimpleNamespace, check: Callable[[Any], None]) -> Any:
     """Return the recording of a file (.nc), or fly a scenario after a check of what is drawn of it."""
-    from airflock.scenarios import load
-    from airflock.view import recording_or_flight
-
     settings = options.parse_settings(o.settings, o.agents, o.duration)
     if o.source.lower().endswith(".nc"):
-        return recording_or_flight(o.source, o.seed, settings, o.law, trust=o.trust)
-    scenario = load(o.source, settings, o.law, trust=o.trust)
+        return view.recording_or_flight(o.source, o.seed, settings, o.law, trust=o.trust)
+    scenario = scenarios.load(o.source, settings, o.law, trust=o.trust)
     terminal.print_notes(scenario.notes)
     check(scenario)
-    return recording_or_flight(scenario, o.seed)
+    return view.recording_or_flight(scenario, o.seed)
 
 
 @verb(PANEL, "airflock.display", "settings json save plot")
@@ -454,25 +414,18 @@ def display(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """
-    from airflock.displays import fly_show, plan_shapes
-
     errors.read(options.check_writable, (o.save, RECORDINGS), (o.plot, PICTURES), reads=o.shapes)
     settings = errors.read(options.parse_settings, o.settings)
     failure = value_or_default(o.failure, "both")
     wanted = (o.shapes, o.drones, o.failing, failure, o.points, o.spacing)
-    layouts = errors.read(plan_shapes, *wanted, value_or_default(settings, {}), "--")
+    layouts = errors.read(displays.plan_shapes, *wanted, value_or_default(settings, {}), "--")
     errors.raise_errors()
-    show = fly_show(layouts, o.drones, o.failing, o.failure, o.seed, settings)
+    show = displays.fly_show(layouts, o.drones, o.failing, o.failure, o.seed, settings)
     rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(o.shapes, show.shape_reports, strict=True)]
     if o.save is not None:
-        from airflock.displays import recording_of
-        from airflock.recordings import save as save_recording
-
-        terminal.print_message(f"saved {save_recording(recording_of(show), o.save)}")
+        terminal.print_message(f"saved {recordings.save(displays.recording_of(show), o.save)}")
     if o.plot is not None:
-        from airflock.view import stood
-
-        terminal.save_picture(stood(show, o.shapes), o.plot)
+        terminal.save_picture(view.stood(show, o.shapes), o.plot)
     if o.json:
         about = {name: getattr(o, name) for name in ("drones", "failing", "failure", "seed")}
         return terminal.print_json({**about, "shapes": rows})
@@ -509,9 +462,7 @@ def watch(o: SimpleNamespace) -> None:
 
     Example: airflock watch mission.json --radio udp:0.0.0.0:14600
     """
-    from airflock.studio import watch as open_page
-
-    open_page(
+    studio.watch(
         o.scenario, options.parse_settings(o.settings, o.agents), o.seed, law=o.law, trust=o.trust, host=o.host,
         port=o.port, against=_comparison(o.against or []), radios=o.radios or [], key=o.key,
         say=terminal.print_message,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from airflock import check, engine, recordings, scenarios, search, support
 from airflock.cli import options, terminal
 from airflock.cli.command import verb
 from airflock.support import AirflockError, as_error, collect_errors, printable, read_text
@@ -30,19 +31,15 @@ def presets(name: str | None = None, *, for_speed: float | None = None, json: bo
     for_speed : float in [0.1, 100], optional
         Print a starting set for this speed, m/s.
     """
-    from airflock.scenarios import files
-
-    known = files.presets()
+    known = scenarios.presets()
     if for_speed is not None:
-        from airflock.scenarios import starting_set
-
-        return _show(starting_set(for_speed), json)
+        return _show(scenarios.starting_set(for_speed), json)
     if name is not None:
-        files.load(name)  # nothing but a scenario is printed: a name may be a link to any file of this computer
+        scenarios.load(name)  # nothing but a scenario is printed: a name may be a link to any file
         with as_error(name):
             text = read_text(known.get(name) or name)
         return _show(text, json)
-    titles = {key: str(files.load(key).document.get("title", "")) for key in known}
+    titles = {key: str(scenarios.load(key).document.get("title", "")) for key in known}
     if json:
         return terminal.print_json(titles)
     width = max(len(key) for key in titles)
@@ -87,12 +84,10 @@ def validate(o: SimpleNamespace) -> None:
 
 def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> dict[str, Any]:
     """Return verdict, notes and errors of one file; each error begins with its name."""
-    from airflock.search import ValidationReport, validate
-
     errors: list[str] = []
-    valid: ValidationReport | None = None
+    valid: search.ValidationReport | None = None
     with collect_errors(errors):
-        valid = validate(name, changed, law, trust=trust)
+        valid = search.validate(name, changed, law, trust=trust)
     return {
         "file": name,
         "verdict": valid.verdict if valid else None,
@@ -108,19 +103,16 @@ def doctor(o: SimpleNamespace) -> None:
     Example: airflock doctor
     """
     if o.clear:
-        from airflock.support import clear_cache, default_cache_folder
-
-        count, size = clear_cache()
+        count, size = support.clear_cache()
         if o.json:
             terminal.print_json(
-                {"cache": str(default_cache_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)}
+                {"cache": str(support.default_cache_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)}
             )
         else:
-            typer.echo(f"{default_cache_folder()}: {count} drivers removed, {size / 1e6:.1f} MB")
+            typer.echo(f"{support.default_cache_folder()}: {count} drivers removed, {size / 1e6:.1f} MB")
         return
-    from airflock.recordings import doctor as examine
 
-    found = examine()
+    found = recordings.doctor()
     if o.json:
         terminal.print_json(found)
     else:
@@ -137,20 +129,18 @@ def keys(o: SimpleNamespace) -> None:
 
     Example: airflock keys radio
     """
-    from airflock.scenarios import keys as known
-
     if o.schema:
         if o.section is not None:
             raise AirflockError(f"--schema is of a whole file; leave {o.section} out")
-        return terminal.print_json(known.json_schema())
-    listed_keys = known.keys(o.section)
+        return terminal.print_json(scenarios.keys.json_schema())
+    listed_keys = scenarios.keys.keys(o.section)
     if o.json:
         terminal.print_json([{**key._asdict(), "options": list(key.options)} for key in listed_keys])
     elif o.section is not None:
         _print_keys(listed_keys)
     else:
-        width = max(map(len, known.sections()))
-        for name, listed in known.sections().items():
+        width = max(map(len, scenarios.keys.sections()))
+        for name, listed in scenarios.keys.sections().items():
             count = len(listed.keys)
             typer.echo(f"{name:<{width}}  {count:>2} key{'s' if count != 1 else ' '}  {listed.about}")
     return None
@@ -177,9 +167,7 @@ def print_part(o: SimpleNamespace) -> None:
 
     Example: airflock print vasarhelyi_2018/4ms --out law
     """
-    from airflock.engine import print_law
-
-    files = print_law(
+    files = engine.print_law(
         o.law, to=o.to, part=o.part, settings=options.parse_settings(o.settings), precision=o.precision, out=o.out,
         trust=o.trust,
     )  # fmt: skip
@@ -195,6 +183,4 @@ def types(o: SimpleNamespace) -> None:
 
     Example: airflock types mine.py
     """
-    from airflock.check import check_types
-
-    check_types(o.files or (), out=o.out)
+    check.check_types(o.files or (), out=o.out)

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, NoReturn
 import typer
 from typer.completion import completion_init, get_completion_script  # type: ignore[attr-defined]
 
-from airflock import __version__
+from airflock import __version__, scenarios
 from airflock.cli.command import GroupOfVerbs, expand_home, usage_error
 from airflock.cli.drone_verbs import fly_app
 from airflock.support import AirflockError, os_error_message, printable, shortened, shortened_lines
@@ -141,9 +141,7 @@ def main() -> None:
     except MemoryError as error:
         _end(f"needs more memory than there is: {error}; ask for fewer agents, flights or samples", error)
     except Exception as error:  # the border: whatever else goes wrong is one line, too
-        from airflock.scenarios import user_error_line
-
-        if message := user_error_line(error):  # on the device python: compiled, a rule raises nothing
+        if message := scenarios.user_error_line(error):  # on the device python: compiled, a rule raises nothing
             _end(message, error)
         _end(f"unexpected {type(error).__name__}: {error}; please report it; AIRFLOCK_DEBUG=1 shows where", error)
 

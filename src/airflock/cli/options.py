@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import airflock
+from airflock import core, engine, runs, scenarios, support
+from airflock.cli import terminal
 from airflock.support import (
     ErrorCollector,
     ScenarioError,
@@ -346,29 +348,24 @@ def completion_of(option: Option) -> Callable[[str], list[str]] | None:
 
 
 def _presets(_: str) -> Iterable[str]:
-    from airflock.scenarios import files
 
-    return files.presets()
+    return scenarios.files.presets()
 
 
 def _laws(_: str) -> Iterable[str]:
-    from airflock.scenarios import MODELS
 
-    return MODELS
+    return scenarios.MODELS
 
 
 def _sections(_: str) -> Iterable[str]:
-    from airflock.scenarios import keys
 
-    return keys.sections()
+    return scenarios.keys.sections()
 
 
 def _keys(incomplete: str, after: str = "") -> Iterable[str]:
     """Yield every key, with `after` behind it; behind KEY= each choice of this key."""
-    from airflock.scenarios import keys
-
     chosen = incomplete.partition("=")[0] if "=" in incomplete else None
-    for key in keys.keys(None):
+    for key in scenarios.keys.keys(None):
         yield from (f"{key.name}={word}" for word in key.options) if key.name == chosen else (f"{key.name}{after}",)
 
 
@@ -405,14 +402,13 @@ def _range_errors(short_options: Mapping[str, tuple[str, float]]) -> list[str]:
     """Return range errors of --agents and --duration, each as it is written and as a number."""
     if not short_options:
         return []
-    from airflock.core import Quantity, declarations, quantity_error
-    from airflock.scenarios import Flight
 
-    known = {name: declared for name, declared, _ in declarations(Flight) if isinstance(declared, Quantity)}
+    declared = core.declarations(scenarios.Flight)
+    known = {name: number for name, number, _ in declared if isinstance(number, core.Quantity)}
     return [
         f"--{key} {written} lies outside {known[key].span}"
         for key, (written, number) in short_options.items()
-        if quantity_error(float(number), known[key])
+        if core.quantity_error(float(number), known[key])
     ]
 
 
@@ -459,15 +455,12 @@ def check_writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequenc
     raise_errors(errors)
 
 
-def announce_run_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
+def announce_run_time(flown: Sequence[Any], threads: int | None, device: str) -> None:
     """Print how long flights on the processor will take, if that is more than a minute."""
-    from airflock.cli.terminal import print_message
-    from airflock.scenarios import run_time_note
-    from airflock.support import available_cores
-
-    note = run_time_note(scenarios, threads or available_cores()) if device == "cpu" else ""
+    cores = support.available_cores()
+    note = scenarios.run_time_note(flown, threads or cores) if device == "cpu" else ""
     if note:
-        print_message(f"note: {note} on {min(threads or available_cores(), available_cores())} cores")
+        terminal.print_message(f"note: {note} on {min(threads or cores, cores)} cores")
 
 
 def compile_before_bar(scenario: Any, precision: int, device: str) -> None:
@@ -475,9 +468,7 @@ def compile_before_bar(scenario: Any, precision: int, device: str) -> None:
     import sys
 
     if device == "cpu" and sys.stderr.isatty():
-        from airflock.engine import compile_for
-
-        compile_for(scenario, precision=precision)
+        engine.compile_for(scenario, precision=precision)
 
 
 def collect_settings(errors: ErrorCollector, o: Any) -> dict[str, Any]:
@@ -500,27 +491,20 @@ def collect_scenario(
     errors: ErrorCollector, name: str, settings: Mapping[str, Any], law: str | None = None, *, trust: bool
 ) -> Any:
     """Return the named scenario with its changes; if a change is invalid, still check the name and its file."""
-    from airflock.scenarios import load
-
-    return invalid_if(settings, errors.read(load, name, value_or_default(settings, {}), law, trust=trust))
+    return invalid_if(settings, errors.read(scenarios.load, name, value_or_default(settings, {}), law, trust=trust))
 
 
 def seeds_from(first: int, count: int) -> list[int]:
     """Return the seeds of --first-seed and --seeds."""
-    from airflock.scenarios import check_seeds
-
-    return check_seeds(range(first, first + count))
+    return scenarios.check_seeds(range(first, first + count))
 
 
 def check_flight_options(device: str, precision: int, scheduler: str | None = None) -> None:
     """Refuse an unknown device, a wrong number of bits, and workers on another device than a cpu."""
-    from airflock.runs import check_worker_device
-    from airflock.support import check_device, check_precision
-
     together = ErrorCollector()
-    together.read(check_device, device)
-    together.read(check_precision, precision)
-    together.read(check_worker_device, scheduler, device)
+    together.read(support.check_device, device)
+    together.read(support.check_precision, precision)
+    together.read(runs.check_worker_device, scheduler, device)
     together.raise_errors()
 
 

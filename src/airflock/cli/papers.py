@@ -8,6 +8,7 @@ from typing import Any
 
 import typer
 
+from airflock import support
 from airflock.cli import terminal
 from airflock.cli.command import verb
 from airflock.support import AirflockError
@@ -107,8 +108,6 @@ def _all(
     quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
 ) -> None:
     """Recompute every paper: in its small form, or every claim under its change, against the committed verdicts."""
-    from airflock.support import cache_folder
-
     require_papers()
     from airflock_papers import quick as tier
 
@@ -118,10 +117,10 @@ def _all(
         message = "give --quick or --breaks, not both" if quick else message
         raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {message}")
     if breaks:
-        _all_breaks(keep or cache_folder() / "papers" / "breaks", threads, as_json)
+        _all_breaks(keep or support.cache_folder() / "papers" / "breaks", threads, as_json)
         return
     before = tier.committed()
-    rows = tier.fly(keep or cache_folder() / "papers" / "quick", terminal.print_message, threads)
+    rows = tier.fly(keep or support.cache_folder() / "papers" / "quick", terminal.print_message, threads)
     changed = tier.changed(before, rows)
     if as_json:
         terminal.print_json({"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in changed]})

@@ -8,6 +8,7 @@ from typing import Any
 
 import typer
 
+from airflock import certificates, runs, scenarios, search, view
 from airflock.cli import options, terminal
 from airflock.cli.command import verb
 from airflock.cli.terminal import counting_parts, progress_line, run_progress
@@ -39,20 +40,10 @@ def evolve(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
-    from airflock.runs import check_timeout, open_folder, run_place
-    from airflock.search import (
-        check_sensitivity_method,
-        check_study_device,
-        evolve_request,
-        resolve_device,
-        run_study,
-        study_executor,
-    )
-
     chosen = {name: getattr(o, name) for name in options.SEARCH_KEYS.split()}
-    place = errors.read(run_place, o.out)
+    place = errors.read(runs.run_place, o.out)
     request = errors.read(
-        evolve_request,
+        search.evolve_request,
         o.scenario,
         value_or_default(options.collect_settings(errors, o), {}),
         search_keys={key: value for key, value in chosen.items() if value is not None and value is not INVALID},
@@ -61,19 +52,19 @@ def evolve(o: SimpleNamespace, errors: ErrorCollector) -> None:
         fast=o.fast,
         folder=place if o.resume else None,
     )
-    errors.read(check_sensitivity_method, o.sensitivity)
-    errors.read(check_timeout, o.timeout)
-    errors.read(check_study_device, o.device, o.scheduler)
+    errors.read(search.check_sensitivity_method, o.sensitivity)
+    errors.read(runs.check_timeout, o.timeout)
+    errors.read(search.check_study_device, o.device, o.scheduler)
     errors.raise_errors()
     study, taken = request
-    study = resolve_device(study, o.device)
-    mended = open_folder(place, study, resume=o.resume)
+    study = search.resolve_device(study, o.device)
+    mended = runs.open_folder(place, study, resume=o.resume)
     notes = [*(note for each in study.scenarios for note in each.notes), *study.notes, taken, mended]
     terminal.print_notes([note for note in notes if note])
     begin = time.perf_counter()
-    executor = study_executor(study, o.scheduler, o.threads, o.timeout)
+    executor = search.study_executor(study, o.scheduler, o.threads, o.timeout)
     with run_progress(o.quiet or o.json) as watch:
-        result = run_study(study, place, executor, watch, sensitivity=o.sensitivity)
+        result = search.run_study(study, place, executor, watch, sensitivity=o.sensitivity)
     if o.json:
         terminal.print_json({**result.document(), "folder": str(o.out), "seconds": time.perf_counter() - begin})
     elif not o.quiet:
@@ -95,21 +86,18 @@ def harden(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock harden study --out flyable.toml
     """
-    from airflock.runs import write_toml_file
-    from airflock.search import MAX_ROUNDS, harden, hardened_document, hardening_request
-
     settings = errors.read(options.parse_settings, o.settings, None, o.duration)
     optima = invalid_if(settings, errors.read(_optima, o.scenario, value_or_default(settings, {}), o.trust))
     places = errors.read(_output_files, o.out, len(value_or_default(optima, [])), o.scenario)
     limits = o.limit or ()
-    errors.read(hardening_request, optima, value_or_default(o.cost, 0.0), limits)
+    errors.read(search.hardening_request, optima, value_or_default(o.cost, 0.0), limits)
     numbers = errors.read(options.seeds_from, o.first_seed, o.seeds)
     errors.raise_errors()
     terminal.print_notes(note for each in optima for note in each.notes)
-    with counting_parts(f"{o.scenario}: flights", MAX_ROUNDS * o.seeds * len(optima), quiet=o.json) as done:
-        steps = harden(optima, numbers, cost=o.cost, limit=limits, threads=o.threads, done=done, folder=o.folder)
+    with counting_parts(f"{o.scenario}: flights", search.MAX_ROUNDS * o.seeds * len(optima), quiet=o.json) as done:
+        steps = search.harden(optima, numbers, cost=o.cost, limit=limits, threads=o.threads, done=done, folder=o.folder)
     for each, place in zip(optima, places, strict=True):
-        write_toml_file(place, hardened_document(each, steps[-1]), "Hardened; see airflock harden --help.")
+        runs.write_toml_file(place, search.hardened_document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if o.json:
         rows = [step.as_dict() for step in steps]
         terminal.print_json({"scenario": optima[0].name, "seeds": o.seeds, "out": str(o.out), "steps": rows})
@@ -129,14 +117,11 @@ def _output_files(out: Path, optima: int, where: str) -> list[Path]:
 
 def _optima(source: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     """Return the optimum, or that of each scenario of a study's folder."""
-    from airflock.scenarios import load
-    from airflock.search import BEST_FILE, further_best_files
-
     folder = Path(source)
-    if folder.is_dir() and not (folder / BEST_FILE).is_file():
-        raise ScenarioError([f"{source}: holds no {BEST_FILE}: its search is not over, or nothing flies in it"])
-    files = [folder / BEST_FILE, *further_best_files(folder)] if folder.is_dir() else [source]
-    return [load(path, settings, trust=trust) for path in files]
+    if folder.is_dir() and not (folder / search.BEST_FILE).is_file():
+        raise ScenarioError([f"{source}: holds no {search.BEST_FILE}: its search is not over, or nothing flies in it"])
+    files = [folder / search.BEST_FILE, *search.further_best_files(folder)] if folder.is_dir() else [source]
+    return [scenarios.load(path, settings, trust=trust) for path in files]
 
 
 def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
@@ -172,23 +157,19 @@ def tune(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
-    from airflock.certificates import check_confidence
-    from airflock.runs import run_place
-    from airflock.search import load_plan, make_request, tune
-
-    folder = errors.read(run_place, o.out)
+    folder = errors.read(runs.run_place, o.out)
     seconds = errors.read(options.parse_seconds, o.budget)
     settings = options.collect_settings(errors, o)
     if o.confidence is not None:
-        errors.read(check_confidence, o.confidence)
+        errors.read(certificates.check_confidence, o.confidence)
     limits, base = o.limit or (), None
     if o.scenario or not o.resume:
         place = errors.read(_start_scenario, o.scenario or [], o.like, o.heard)
         base = options.collect_scenario(errors, place, settings, trust=o.trust)
         start = errors.read(_tuned_scenario, base, o.like)
         # With logs the plan depends on their contents.
-        plan = errors.read(load_plan, folder, start, o.resume) if o.like is None else None
-        errors.read(make_request, start, limits, o.confidence, value_or_default(plan, None))
+        plan = errors.read(search.load_plan, folder, start, o.resume) if o.like is None else None
+        errors.read(search.make_request, start, limits, o.confidence, value_or_default(plan, None))
         errors.raise_errors()
         terminal.print_notes(start.notes)
         options.compile_before_bar(base, 32, "cpu")
@@ -207,7 +188,7 @@ def tune(o: SimpleNamespace, errors: ErrorCollector) -> None:
             shown.append(text)
             line.say(text)
 
-        tuning = tune(what, folder, budget=seconds, limit=limits, watch=watch, note=note, **how)
+        tuning = search.tune(what, folder, budget=seconds, limit=limits, watch=watch, note=note, **how)
     if o.json:
         terminal.print_json(tuning.document())
     else:
@@ -230,9 +211,7 @@ def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -
 
 def _tuned_scenario(base: Any, like: str | None) -> Any:
     """Return the scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
-    from airflock.search import prepare_start
-
-    return base if like is not None else prepare_start(base)[0]
+    return base if like is not None else search.prepare_start(base)[0]
 
 
 def _print_tuned(tuning: Any, shown: list[str]) -> None:
@@ -259,18 +238,6 @@ def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
             [f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else []
         )
         return _check(o.scenario or "", o.threads, o.trust, o.json)
-    from airflock.certificates import (
-        campaign_from_request,
-        check_confidence,
-        check_flight_count,
-        check_flight_options,
-        check_map_axes,
-        check_split,
-        check_workers,
-        fly_campaign,
-        resumed_campaign,
-        tolerance_keys,
-    )
     from airflock.cli.flight_verbs import parse_axis
 
     errors.read(options.check_writable, (o.out, SCENARIOS), (o.plot, PICTURES), reads=[o.scenario or ""])
@@ -281,7 +248,7 @@ def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
     also: dict[str, Any] = {"split": o.split, "axes": {}}
     if o.scenario is None and o.resume and folder is not None:
         errors.raise_errors()
-        campaign, held = resumed_campaign(
+        campaign, held = certificates.resumed_campaign(
             folder, trust=o.trust, limit=o.limit, flights=o.flights, settings=settings, law=o.law,
             uncertain=o.uncertain,
         )  # fmt: skip
@@ -290,17 +257,19 @@ def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
         o.tolerance_of = o.tolerance_of or held["tolerance"]
     else:
         loaded = options.collect_scenario(errors, o.scenario or "", settings, o.law, trust=o.trust)
-        errors.read(check_confidence, o.confidence)
-        errors.read(check_flight_count, o.flights)
-        errors.read(check_flight_options, o.precision, o.device)
-        campaign = errors.read(campaign_from_request, loaded, o.limit or [], o.confidence, o.flights, **how)
-    also["keys"] = errors.read(tolerance_keys, loaded, o.tolerance_of or o.tolerance)
+        errors.read(certificates.check_confidence, o.confidence)
+        errors.read(certificates.check_flight_count, o.flights)
+        errors.read(certificates.check_flight_options, o.precision, o.device)
+        campaign = errors.read(
+            certificates.campaign_from_request, loaded, o.limit or [], o.confidence, o.flights, **how
+        )
+    also["keys"] = errors.read(certificates.tolerance_keys, loaded, o.tolerance_of or o.tolerance)
     if also["split"]:
-        errors.read(check_split, campaign)
+        errors.read(certificates.check_split, campaign)
     if o.over:
         axes = errors.collect_each(partial(parse_axis, option="--map"), o.over)
-        also["axes"] = errors.read(check_map_axes, loaded, errors.read(dict, axes))
-    errors.read(check_workers, o.timeout, o.scheduler, o.device)
+        also["axes"] = errors.read(certificates.check_map_axes, loaded, errors.read(dict, axes))
+    errors.read(certificates.check_workers, o.timeout, o.scheduler, o.device)
     if o.resume and o.out is None:
         errors.note("--resume: name the certificate whose flights are to be continued with --out")
     errors.raise_errors()
@@ -309,7 +278,7 @@ def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
         options.compile_before_bar(campaign.flown, o.precision, o.device)
     also |= {name: getattr(o, name) for name in ("scheduler", "threads", "timeout")}
     with run_progress(o.json) as watch:
-        result = fly_campaign(campaign, folder, seconds, watch, resume=o.resume, **also)
+        result = certificates.fly_campaign(campaign, folder, seconds, watch, resume=o.resume, **also)
     return _end(result, o.out, o.plot, o.json)
 
 
@@ -319,9 +288,7 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
         result.save(out)
         terminal.print_message(f"saved {out}")
     if plot is not None:
-        from airflock.view import plot_certificate
-
-        terminal.save_picture(plot_certificate(result), plot)
+        terminal.save_picture(view.plot_certificate(result), plot)
     if as_json:
         terminal.print_json({**result.document(), "seconds": result.seconds})
     else:
@@ -332,10 +299,8 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     """Check a certificate; exit with status 1 where it does not hold."""
-    from airflock.certificates import check_certificate
-
     with counting_parts(f"{path}: flights again", quiet=as_json) as done:
-        result = check_certificate(path, threads=threads, trust=trust, on_done=done)
+        result = certificates.check_certificate(path, threads=threads, trust=trust, on_done=done)
     if as_json:
         terminal.print_json({"same": result.same, **vars(result)})
     else:

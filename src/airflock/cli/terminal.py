@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any, Protocol
 
+from airflock import view
 from airflock.support import format_cell
 
 
@@ -107,9 +108,7 @@ def print_result(result: Any, as_json: bool = False) -> None:
 
 def save_picture(figure: Any, path: Any) -> None:
     """Write a figure and print where it is."""
-    from airflock.view import save_figure
-
-    save_figure(figure, path)
+    view.save_figure(figure, path)
     print_message(f"saved {path}")
 
 
