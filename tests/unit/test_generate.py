@@ -4,7 +4,6 @@ import ast
 
 import pytest
 
-from airflock.engine.text.copies import DependencyRecorder, TextCache
 from airflock.engine.text.generate import DriverSource
 from airflock.support.errors import RuleError
 
@@ -154,29 +153,3 @@ def test_a_text_written_before_is_that_of_now(monkeypatch):
 
 def other_step(x):
     return 4.0 * x
-
-
-class Form:
-    """What a rule's text is written for: one choice."""
-
-    def __init__(self, form):
-        self.constants, self.vectors = {"p": {"form": form}}, {}
-
-
-def asked_of(form):
-    """What a copy asks that is written for a choice."""
-    notes = DependencyRecorder(asked_of, Form(form))
-    notes.choice("p", "form")
-    return notes
-
-
-def test_a_text_comes_back_for_the_same_answers_alone_and_only_the_last_are_kept():
-    kept = TextCache(max_rules=2, max_texts=2)
-    for form in ("slow", "fast", "sure"):
-        kept.keep("rule", asked_of(form), form)
-    assert [kept.text("rule", asked_of(form)) for form in ("slow", "fast", "sure")] == [None, "fast", "sure"]
-    kept.keep("other", asked_of("fast"), "other")
-    assert kept.text("rule", asked_of("sure")) == "sure"  # so the other one is now the one that is longest unasked for
-    kept.keep("third", asked_of("fast"), "third")
-    assert kept.text("other", asked_of("fast")) is None and kept.text("third", asked_of("fast")) == "third"
-    assert kept.text("rule", asked_of("fast")) == "fast"

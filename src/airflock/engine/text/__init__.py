@@ -1,1 +1,1 @@
-"""Rules as text of a driver: their first call as plain Python, and their copies."""
+"""Rules as text of a driver: their first call as plain Python, and what drivers and firmware hold of them."""

@@ -12,15 +12,13 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from typing import Any
 
-from airflock.core import law, random as random_streams, text_state, tree_of, walk_tree
-from airflock.engine.text.copies import DependencyRecorder, TextCache
+from airflock.core import law, random as random_streams, tree_of, walk_tree
 from airflock.engine.text.rewrite import NO_CHOICES, RuleRewriter
 from airflock.support import to_identifier
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
 NONE: Mapping[str, Mapping[str, int]] = {}
-COPIES = TextCache()  # of this process
 INLINED = '@njit(inline="always", **JIT)'
 
 
@@ -123,16 +121,9 @@ class DriverSource:
         return name
 
     def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
+        # Texts are written for each driver anew: keeping them saved 5 to 14 of the 30 ms of a text,
+        # which nobody sees beside a compiler.
         law.check_rule(rule)
-        notes = DependencyRecorder(rule, self)
-        of = rule, text_state([rule]), name, *chosen.items(), self.decorator, self.law, self.allow_builtins, self._apart
-        text = COPIES.text(of, notes)
-        if text is None:
-            text = self._copied(rule, name, chosen, notes)
-            COPIES.keep(of, notes, text)
-        return text
-
-    def _copied(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str], notes: DependencyRecorder) -> str:
         node = tree_of(rule)
         node.name = name
         node.returns = None
@@ -142,7 +133,7 @@ class DriverSource:
             argument.annotation = None
         if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
             node.body.pop(0)
-        rewritten = RuleRewriter(rule, self, chosen, notes).visit(node)
+        rewritten = RuleRewriter(rule, self, chosen).visit(node)
         _end_at_return(rewritten)
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is
         # unrolled and vectorised across its few scalars, and the loop over agents around it no

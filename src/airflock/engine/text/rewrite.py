@@ -10,11 +10,13 @@ import math
 import types
 from collections.abc import Callable, Mapping
 from copy import deepcopy
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from airflock.core import component_names, law, walk_tree
-from airflock.engine.text.copies import DependencyRecorder
+from airflock.core import component_names, law, resolve_global, walk_tree
 from airflock.support import RuleError
+
+if TYPE_CHECKING:
+    from airflock.engine.text.generate import DriverSource
 
 
 class VectorUnroller(ast.NodeTransformer):
@@ -136,17 +138,6 @@ GIVEN = law.ALLOWED_CALLS | {law.CAST_NAME, *law.RENAMED_BUILTINS.values()}  # w
 NO_CHOICES: Mapping[str, str] = {}
 
 
-class RewriteTarget(Protocol):
-    """The driver that a rule is written for: a `generate.DriverSource`."""
-
-    law: int
-    allow_builtins: bool
-    vectors: Mapping[str, Mapping[str, int]]
-
-    def names(self) -> set[str]:
-        """Names in the driver of all that has come so far."""
-
-
 def law_suffix(law: int | None) -> str:
     """Return the suffix of names of one law of several in a driver."""
     return f"_{law}" if law else ""
@@ -155,20 +146,15 @@ def law_suffix(law: int | None) -> str:
 class RuleRewriter(VectorUnroller):
     """Bind the free names of one rule and cast its literals; arguments that are chosen become constants."""
 
-    def __init__(
-        self, rule: Callable[..., Any], source: RewriteTarget, chosen: Mapping[str, str], recorder: DependencyRecorder
-    ):
-        self.rule = rule
-        self.source = source
-        self.chosen = chosen
-        self.notes = recorder
-        self.local = set(rule.__code__.co_varnames) - set(chosen)
+    def __init__(self, rule: Callable[..., Any], source: "DriverSource", chosen: Mapping[str, str]):
         super().__init__(rule, source.vectors)
+        self.source, self.chosen = source, chosen
+        self.local = set(rule.__code__.co_varnames) - set(chosen)
 
-    def size(self, node: ast.AST) -> int:
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            return self.notes.size(node.value.id, node.attr)
-        return 0
+    def _choice(self, node: ast.Attribute) -> Any:
+        """Return the choice or the usual number that a field of a record is; None if it is neither."""
+        record = node.value.id if isinstance(node.value, ast.Name) else ""
+        return self.source.constants.get(record, {}).get(node.attr)
 
     def _real(self, node: ast.expr) -> ast.expr:
         return ast.Call(ast.Name("real", ast.Load()), [node], [])
@@ -188,7 +174,7 @@ class RuleRewriter(VectorUnroller):
         if isinstance(node.value, ast.Name):
             if node.value.id == "math" and isinstance(getattr(math, node.attr, None), float):
                 return self._real(ast.Constant(getattr(math, node.attr)))
-            value = self.notes.choice(node.value.id, node.attr)
+            value = self._choice(node)
             if value is not None:
                 return ast.Constant(value) if isinstance(value, str) else self._real(ast.Constant(value))
             if self.size(node):
@@ -247,7 +233,7 @@ class RuleRewriter(VectorUnroller):
 
     def _hand_on(self, node: ast.Call) -> None:
         """Name all arguments of a call; a plain function that is handed a choice is called by its text for this one."""
-        called = self.notes.free(node.func.id) if isinstance(node.func, ast.Name) else None
+        called = resolve_global(node.func.id, self.rule) if isinstance(node.func, ast.Name) else None
         if isinstance(called, types.FunctionType) and not node.keywords:  # a driver knows no defaults
             usual = called.__defaults__ or ()
             missing = called.__code__.co_argcount - len(node.args)
@@ -256,7 +242,7 @@ class RuleRewriter(VectorUnroller):
         if isinstance(called, types.FunctionType) and any(text is not None for text in texts):
             names = called.__code__.co_varnames
             chosen = {name: text for name, text in zip(names, texts, strict=False) if text is not None}
-            node.func = ast.Name(self.notes.name(called, chosen), ast.Load())
+            node.func = ast.Name(self.source.name(called, chosen), ast.Load())
             node.args = [argument for argument, text in zip(node.args, texts, strict=True) if text is None]
 
     def _text(self, node: ast.expr) -> str | None:
@@ -266,8 +252,8 @@ class RuleRewriter(VectorUnroller):
             value = node.value
         elif isinstance(node, ast.Name):
             value = self.chosen.get(node.id)
-        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            value = self.notes.choice(node.value.id, node.attr)
+        elif isinstance(node, ast.Attribute):
+            value = self._choice(node)
         return value if isinstance(value, str) else None
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
@@ -292,7 +278,7 @@ class RuleRewriter(VectorUnroller):
             return ast.Constant(self.chosen[node.id])
         if node.id in GIVEN or node.id in self.source.names() or node.id.startswith("percept_"):
             return node
-        value = self.notes.free(node.id)
+        value = resolve_global(node.id, self.rule)
         # Global constants are inlined, real ones in the precision of the driver; bool first, as it
         # is an int in Python.
         if isinstance(value, bool):
@@ -302,7 +288,7 @@ class RuleRewriter(VectorUnroller):
         if isinstance(value, int):
             return ast.Constant(value)
         if isinstance(value, types.FunctionType) or (isinstance(value, type) and issubclass(value, tuple)):
-            return ast.Name(self.notes.name(value, NO_CHOICES), node.ctx)
+            return ast.Name(self.source.name(value), node.ctx)
         if isinstance(value, types.ModuleType) or (self.source.allow_builtins and hasattr(builtins, node.id)):
             return node
         why = (
