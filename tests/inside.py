@@ -103,6 +103,8 @@ NAMES = {
     "clusters_of": ("stages.clusters", "sum_clusters"),
     "EVERY": ("stages.flight", "EVERY"),
     "Flock": ("stages.state", "FlockRows"),
+    "FlightView": ("stages.records", "FlightView"),
+    "SortedCells": ("stages.records", "SortedCells"),
     "Surroundings": ("stages.records", "WorldArrays"),
     "Itself": ("stages.words", "IdentityRow"),
     "ZERO": ("stages.words", "ZERO"),

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from inside import Flock, Itself, stages_cells as cells, stages_words as words
+from inside import FlightView, Flock, Itself, SortedCells, stages_cells as cells, stages_words as words
 
 HALF = {2: (6.0, 9.0, 0.0), 3: (6.0, 9.0, 4.0)}  # of the periodic box, m
 KINDS = [(dimensions, periodic) for dimensions in (2, 3) for periodic in (False, True)]
@@ -47,8 +47,8 @@ class Sorted:
         room = cells.agents_around(oy, oz, self.starts, self.count, plan=self.plan)
         box, who = self.heard[:, : room + 2 * words.BLOCK], np.zeros(room + 2 * words.BLOCK, int)
         slab, middle, found = cells.copy_line(
-            oy, oz, self.starts, self.flat, self.whose, self.whose, box, self.count, self.flock, self.numbers,
-            plan=self.plan, carried=((cells.WHO, who),),
+            oy, oz, SortedCells(self.starts, self.whose, self.packed, self.flat, self.count), self.whose, box,
+            FlightView(self.plan, None, self.flock, self.numbers, None, None), carried=((cells.WHO, who),),
         )  # fmt: skip
         assert found <= room
         cells.pad_candidates(found, box, box[self.plan.dimensions :], plan=self.plan, carried=((cells.WHO, who),))

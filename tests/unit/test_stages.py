@@ -16,6 +16,7 @@ from airflock.engine import plan_of
 from flocks import ISLANDS, NOTCHED, scenario
 from inside import (
     WHOLE,
+    FlightView,
     Flock,
     Itself,
     Surroundings,
@@ -161,13 +162,14 @@ class World:
         fields = decide._asked(self.build, words.nonzero_fields(model.Sums, plan.dimensions))
         sums = tuple((c, model.reduce.get(model.Sums._fields[c], "sum")) for c in fields)
         around = self.around()
+        flight = FlightView(plan, model, flock, numbers, whole, around)
 
         def pick(i):
-            meet.meet(flock, numbers, whole, around, i, range(n), n, n, step, plan=plan)
+            meet.meet(flight, i, range(n), n, n, step)
 
         neighbours.neighbours(
-            range(n), range(n), flock, numbers, whole, around, n, step, 0.7, 0.2, state["words"], draw, None, pick,
-            plan=plan, model=model, sums=sums, images=plan.periodic,
+            range(n), range(n), flight, n, step, 0.7, 0.2, state["words"], draw, None, pick, sums=sums,
+            images=plan.periodic,
         )  # fmt: skip
         surfaces.boundaries(range(n), flock, numbers, whole, self.rest["faces"], around, plan=plan, model=model)
         deciding.decide(

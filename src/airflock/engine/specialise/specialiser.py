@@ -44,7 +44,7 @@ from airflock.engine.specialise.local_names import (
     written_names,
 )
 from airflock.engine.stages import records, words
-from airflock.engine.stages.records import SortedCells, WorldArrays
+from airflock.engine.stages.records import FlightView, SortedCells, WorldArrays
 from airflock.engine.stages.state import SCENE_ARRAYS, FlockRows, own_row
 from airflock.engine.stages.words import IdentityRow, NamedConstant, ZeroRow
 
@@ -401,14 +401,17 @@ class StatementSpecialiser(ExpressionSpecialiser):
         own = {"own": {letter: ast.Name(kind, LOAD) for letter, kind in kinds.items()}}
         number: object = driver_name("order", "number") if self.build.slots else IdentityRow()
         scene = ArrayBundle("scene", SCENE_ARRAYS)
-        return {
-            "plan": plan,
-            "model": plan.model,
-            "flock": FlockRows(take, plan.dimensions, number),
-            "numbers": SimpleNamespace(**{letter: driver_name(letter, "record") for letter in plan.records} | own),
-            "whole": SimpleNamespace(**{name: driver_name(name, "whole") for name in INTEGER_NAMES}),
+        flight = FlightView(
+            plan,
+            plan.model,
+            FlockRows(take, plan.dimensions, number),
+            SimpleNamespace(**{letter: driver_name(letter, "record") for letter in plan.records} | own),
+            SimpleNamespace(**{name: driver_name(name, "whole") for name in INTEGER_NAMES}),
+            WorldArrays(driver_name("edges", "argument"), driver_name("spans", "argument"), scene),
+        )
+        return vars(flight) | {
+            "flight": flight,
             "scene": scene,
-            "around": WorldArrays(driver_name("edges", "argument"), driver_name("spans", "argument"), scene),
             "cells": SortedCells(*(driver_name(name, "argument") for name in CELLS)),
             "agents": AgentLoop("n", agents=True, law=plan.law),
             "lanes": AgentLoop("m", agents=True),

@@ -6,7 +6,7 @@ from typing import Any
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.meet import free_distance
-from airflock.engine.stages.records import WorldArrays
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import HALF_SIZES, ONE, TINY, ZERO, X, Y, Z, choose, integer, least, vector
 from airflock.world import nearest_image
@@ -42,26 +42,22 @@ def talkers_in_range(i: int, others: Iterable[int], range2: Any, flock: FlockRow
     return talkers
 
 
-def fill_clear(
-    i: int, others: Iterable[int], range2: Any, flock: FlockRows, w: Any, whole: Any, around: WorldArrays, *, plan: Plan
-) -> None:
+def fill_clear(i: int, others: Iterable[int], range2: Any, flight: FlightView) -> None:
     """Fill the row `clear`: 1 where nothing stands between the true places of agent i and another one."""
     # A cast branches; its answers go to a row first, so that the pair loop itself stays one of
     # vectors.
     for j in others:
-        open_way = is_clear(i, j, range2, flock, w, whole, around, plan=plan)
-        flock.clear[j] = open_way
+        open_way = is_clear(i, j, range2, flight)
+        flight.flock.clear[j] = open_way
 
 
-def is_clear(
-    i: int, j: int, range2: Any, flock: FlockRows, w: Any, whole: Any, around: WorldArrays, *, plan: Plan
-) -> Any:
+def is_clear(i: int, j: int, range2: Any, flight: FlightView) -> Any:
     """Return 1 if nothing stands between the true places of two agents in range of each other, else 0."""
-    x = flock.position
+    plan, x = flight.plan, flight.flock.position
     open_way = ONE
     o = vector()
     for a in range(plan.dimensions):
-        o[a] = apart(x[a][j], x[a][i], a, w, plan=plan)
+        o[a] = apart(x[a][j], x[a][i], a, flight.numbers.w, plan=plan)
     apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
     # A cast is dear: only pairs in range of each other are cast at.
     if (apart2 <= range2) & (integer(j) != integer(i)):
@@ -69,6 +65,6 @@ def is_clear(
         ux = o[X] / r
         uy = o[Y] / r
         uz = o[Z] / r
-        free = free_distance(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, around, plan=plan)
+        free = free_distance(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, flight)
         open_way = ZERO if free < r else ONE
     return open_way

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from airflock.engine.plan import Plan
+from airflock.engine.stages.records import FlightView, SortedCells
 from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import (
     AWAY,
@@ -203,38 +204,29 @@ def image_shift(q: Any, c: Any, count: Any, width: Any) -> Any:
 
 
 def copy_cell(
-    origin: int, inside: int, found: int, shift: Any, flat: Any, ident: Any, whose: Any, box: Any, flock: FlockRows,
-    *, plan: Plan, carried: tuple[tuple[str, Any], ...],
+    origin: int, inside: int, found: int, shift: Any, cells: SortedCells, ident: Any, box: Any, flight: FlightView,
+    *, carried: tuple[tuple[str, Any], ...],
 ) -> None:  # fmt: skip
     """Copy the agents at places from `origin` on to `cell_box`, behind those found so far, shifted to their image."""
     # Copied in vectors of eight past the end of the cell, where the next cell overwrites them:
     # copying one number at a time took 40 % of an agent-step (203 ns, 159 ns with vectors).
     for s in range(0, inside, BLOCK):  # past the end of a cell, where the next ones overwrite it
-        for a in range(plan.dimensions):
-            copy_block(box, a, found + s, flat, origin + s, shift[a])
-        for a in range(plan.dimensions):
-            copy_block(box, a + plan.dimensions, found + s, flat, origin + s, ZERO)
+        for a in range(flight.plan.dimensions):
+            copy_block(box, a, found + s, cells.flat, origin + s, shift[a])
+        for a in range(flight.plan.dimensions):
+            copy_block(box, a + flight.plan.dimensions, found + s, cells.flat, origin + s, ZERO)
     if carried:
         for s in range(inside):
             for what, row in carried:
-                row[found + s] = ident[origin + s] if what == WHO else flock.own("", "group")[whose[origin + s]]
+                row[found + s] = (
+                    ident[origin + s] if what == WHO else flight.flock.own("", "group")[cells.whose[origin + s]]
+                )
 
 
 def copy_line(
-    oy: int,
-    oz: int,
-    starts: Any,
-    flat: Any,
-    ident: Any,
-    whose: Any,
-    box: Any,
-    count: Any,
-    flock: FlockRows,
-    numbers: Any,
-    *,
-    plan: Plan,
-    carried: tuple[tuple[str, Any], ...],
-) -> Any:
+    oy: int, oz: int, cells: SortedCells, ident: Any, box: Any, flight: FlightView,
+    *, carried: tuple[tuple[str, Any], ...],
+) -> Any:  # fmt: skip
     """Copy the agents in and around a line of cells to `cell_box`, slab by slab, at the images that they are met at.
 
     Returns where each slab begins, where in it the own cell begins, and how many were copied.
@@ -242,9 +234,9 @@ def copy_line(
     ident   : number of the agent at each place
     carried : what else is copied (WHO, GROUP), and to which rows
     """
-    w = numbers.w
-    slab = np.zeros(count[X] + 3, np.int64)
-    middle = np.zeros(count[X] + 1, np.int64)
+    plan, w = flight.plan, flight.numbers.w
+    slab = np.zeros(cells.count[X] + 3, np.int64)
+    middle = np.zeros(cells.count[X] + 1, np.int64)
     found = 0
     shift = vector()
     if plan.periodic:
@@ -252,29 +244,29 @@ def copy_line(
     # Slab by slab around a whole line of cells: each agent is copied nine times, not 27 as around
     # each cell, and the candidates of a cell are three slabs in a row. 534 -> 231 ns per agent-step
     # at 100,000 boids.
-    for qx in range(-1, count[X] + 1) if plan.periodic else range(0, count[X]):
+    for qx in range(-1, cells.count[X] + 1) if plan.periodic else range(0, cells.count[X]):
         slab[qx + 1] = found
-        cx = wrap_cell(qx, count[X], plan=plan)
+        cx = wrap_cell(qx, cells.count[X], plan=plan)
         if plan.periodic:
-            shift[X] = image_shift(qx, cx, count[X], width_x)
-        for qz in cells_beside(oz, count[Z], plan=plan) if plan.dimensions == 3 else (0,):
-            cz = wrap_cell(qz, count[Z], plan=plan)
+            shift[X] = image_shift(qx, cx, cells.count[X], width_x)
+        for qz in cells_beside(oz, cells.count[Z], plan=plan) if plan.dimensions == 3 else (0,):
+            cz = wrap_cell(qz, cells.count[Z], plan=plan)
             if plan.periodic and plan.dimensions == 3:
-                shift[Z] = image_shift(qz, cz, count[Z], w.half_z + w.half_z)
-            for qy in cells_beside(oy, count[Y], plan=plan):
-                cy = wrap_cell(qy, count[Y], plan=plan)
+                shift[Z] = image_shift(qz, cz, cells.count[Z], w.half_z + w.half_z)
+            for qy in cells_beside(oy, cells.count[Y], plan=plan):
+                cy = wrap_cell(qy, cells.count[Y], plan=plan)
                 if plan.periodic:
-                    shift[Y] = image_shift(qy, cy, count[Y], w.half_y + w.half_y)
-                base = first_cell_of_row(cy, cz, count, plan=plan)
+                    shift[Y] = image_shift(qy, cy, cells.count[Y], w.half_y + w.half_y)
+                base = first_cell_of_row(cy, cz, cells.count, plan=plan)
                 if (qy == oy) & (qz == oz) if plan.dimensions == 3 else qy == oy:
-                    middle[min(max(qx, 0), count[X])] = found
-                origin = starts[base + cx]
-                inside = starts[base + cx + 1] - origin
-                copy_cell(origin, inside, found, shift, flat, ident, whose, box, flock, plan=plan, carried=carried)
+                    middle[min(max(qx, 0), cells.count[X])] = found
+                origin = cells.starts[base + cx]
+                inside = cells.starts[base + cx + 1] - origin
+                copy_cell(origin, inside, found, shift, cells, ident, box, flight, carried=carried)
                 found += inside
-    slab[count[X] + 2 if plan.periodic else count[X] + 1] = found
+    slab[cells.count[X] + 2 if plan.periodic else cells.count[X] + 1] = found
     if not plan.periodic:
-        slab[count[X] + 2] = found
+        slab[cells.count[X] + 2] = found
     return slab, middle, found
 
 

@@ -6,9 +6,9 @@ from typing import Any
 from airflock.core import Model, norm
 from airflock.engine.plan import Plan
 from airflock.engine.stages.air import fill_clear, talkers_in_range
-from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, pair
+from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, Sums, pair
 from airflock.engine.stages.receive import first_of_four, packet_count
-from airflock.engine.stages.records import Decision, PairLoopAgent, SquaredRanges, WorldArrays
+from airflock.engine.stages.records import Decision, FlightView, PairLoopAgent, SquaredRanges
 from airflock.engine.stages.state import FlockRows, agent_numbers, all_agents
 from airflock.engine.stages.words import (
     LIMIT,
@@ -84,26 +84,10 @@ def draw_words(i: int, flock: FlockRows, draw: Callable[[int], None], *, plan: P
 
 
 def neighbours(
-    agents: Iterable[int],
-    others: Iterable[int],
-    flock: FlockRows,
-    numbers: Any,
-    whole: Any,
-    around: WorldArrays,
-    n: int,
-    decision: int,
-    time: float,
-    late: float,
-    words: Any,
-    draw: Callable[[int], None] | None,
-    drawn: Callable[[int, int], Any] | None,
-    meet: Callable[[int], None],
-    *,
-    plan: Plan,
-    model: Model,
-    sums: tuple[tuple[int, str], ...],
-    images: bool,
-) -> None:
+    agents: Iterable[int], others: Iterable[int], flight: FlightView, n: int, decision: int, time: float, late: float,
+    words: Any, draw: Callable[[int], None] | None, drawn: Callable[[int, int], Any] | None,
+    meet: Callable[[int], None], *, sums: Sums, images: bool,
+) -> None:  # fmt: skip
     """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
     late   : age of data on arrival, s
@@ -114,7 +98,8 @@ def neighbours(
     sums   : each field of Sums that is summed, and how it is reduced
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)
     """
-    k, w = numbers.k, numbers.w
+    plan, model, flock, numbers = flight.plan, flight.model, flight.flock, flight.numbers
+    k = numbers.k
     # A neighbour at exactly the range or the reach counts. Squares of distances that carry the
     # guard TINY, which only double precision can tell, are compared with squares that carry it,
     # too. Who is in range is a matter of true distances, which carry none. Lattices and formations
@@ -149,23 +134,20 @@ def neighbours(
         for c, how in sums:
             total[c] = REDUCTION_START[how]
         if plan.radio.asks_for("talkers"):  # noqa: SIM108 - as above
-            talkers = talkers_in_range(i, others, range_ * range_, flock, w, plan=plan)
+            talkers = talkers_in_range(i, others, range_ * range_, flock, numbers.w, plan=plan)
         else:
             talkers = ZERO
         # A cast per pair in range through the tree of shapes: in a city, shading costs 3.6 times
         # the flight with `constant`.
         if plan.shades and drawn is None:
-            fill_clear(i, others, range_ * range_, flock, w, whole, around, plan=plan)
-        me = PairLoopAgent(i, ii, ii, None, own, v, h, true, own_p, talkers, lot)
+            fill_clear(i, others, range_ * range_, flight)
         reach = SquaredRanges(range_ * range_, range2, near2)
+        me = PairLoopAgent(i, ii, ii, None, own, v, h, true, own_p, talkers, lot, all_agents(flock), reach, at)
         # One pass where everybody in range is met; two where a topology first ranks those who are
         # heard.
         for part in (HEAR_AND_ADD,) if plan.topology is None else (HEAR, ADD):
             for j in others:
-                pair(
-                    me, j, j, part, total, reach, at, flock, all_agents(flock), numbers, whole, around, plan=plan,
-                    model=model, sums=sums, images=images,
-                )  # fmt: skip
+                pair(me, j, j, part, total, flight, sums=sums, images=images)
             if part == HEAR:
                 meet(i)
         for c, _ in sums:

@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from airflock.core import Model
-from airflock.engine.plan import Plan
 from airflock.engine.stages.cells import (
     CHUNKS,
     GROUP,
@@ -24,15 +22,15 @@ from airflock.engine.stages.cells import (
 )  # fmt: skip
 from airflock.engine.stages.meet import call_topology
 from airflock.engine.stages.neighbours import fill_heading, squared_reach
-from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, pair
+from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, Sums, pair
 from airflock.engine.stages.records import (
     CandidateRows,
     CellLine,
     Decision,
+    FlightView,
     PairLoopAgent,
     SortedCells,
     SquaredRanges,
-    WorldArrays,
 )
 from airflock.engine.stages.state import FlockRows, agent_numbers
 from airflock.engine.stages.words import (
@@ -55,22 +53,10 @@ from airflock.engine.stages.words import (
     vector,
 )  # fmt: skip
 
-Sums = tuple[tuple[int, str], ...]  # each field of Sums that is summed, and how it is reduced
 
-
-def make_line(
-    oy: int,
-    oz: int,
-    flock: FlockRows,
-    numbers: Any,
-    work: Any,
-    cells: SortedCells,
-    ident: Any,
-    *,
-    plan: Plan,
-    model: Model,
-) -> Any:
+def make_line(oy: int, oz: int, flight: FlightView, work: Any, cells: SortedCells, ident: Any) -> Any:
     """All who lie in and around a line of cells, side by side."""
+    plan, model = flight.plan, flight.model
     room = agents_around(oy, oz, cells.starts, cells.count, plan=plan)
     # Scratch of one line: it is small, stays in the cache and belongs to one thread.
     box = np.empty((2 * plan.dimensions, room + 2 * BLOCK), work.dtype)
@@ -86,10 +72,7 @@ def make_line(
         h[a] = box[a]
     for a in range(plan.dimensions):
         hv[a] = box[a + plan.dimensions]
-    slab, middle, found = copy_line(
-        oy, oz, cells.starts, cells.flat, ident, cells.whose, box, cells.count, flock, numbers, plan=plan,
-        carried=carried,
-    )  # fmt: skip
+    slab, middle, found = copy_line(oy, oz, cells, ident, box, flight, carried=carried)
     pad_candidates(found, h, hv, plan=plan, carried=carried)
     # a driver keeps only those of these rows that its topology reads
     square = np.zeros(room + 2 * BLOCK, work.dtype)
@@ -104,10 +87,10 @@ def make_line(
 
 def sum_agent(
     e: int, line: CellLine, first: Any, many: Any, padded: int, ox: int, here: int, reach: SquaredRanges, at: Decision,
-    flock: FlockRows, numbers: Any, whole: Any, around: WorldArrays, cells: SortedCells, ident: Any, sums_of: Any,
-    *, plan: Plan, model: Model, sums: Sums,
+    flight: FlightView, cells: SortedCells, ident: Any, sums_of: Any, *, sums: Sums,
 ) -> None:  # fmt: skip
     """Sum the rule for the agent at place e over the candidates of its cell, from place `first` of the line on."""
+    plan, model, flock, numbers = flight.plan, flight.model, flight.flock, flight.numbers
     who = cells.whose[e]
     own_p = agent_numbers(who, "p", flock, numbers, plan=plan)
     if plan.varies("p"):
@@ -121,43 +104,27 @@ def sum_agent(
     for c, how in sums:
         total[c] = REDUCTION_START[how]
     place = integer(line.middle[ox] - line.slab[ox] + e - cells.starts[here])
-    me = PairLoopAgent(who, place, ident[e], many, own, v, h, own, own_p, ZERO, ZERO)
+    me = PairLoopAgent(who, place, ident[e], many, own, v, h, own, own_p, ZERO, ZERO, line.others, heeds, at)
     for part in (HEAR_AND_ADD,) if plan.topology is None else (HEAR, ADD):
         # With a signed index Numba adds the wraparound of negative indices, which turns vector
         # loads into gathers: 391 ns instead of 295 ns per agent-step.
         for q in range(padded):
             j = first + np.uint64(q)  # it cannot count from the end, which would turn loads of vectors into gathers
-            pair(
-                me, j, q, part, total, heeds, at, flock, line.others, numbers, whole, around, plan=plan, model=model,
-                sums=sums, images=False,
-            )  # fmt: skip
+            pair(me, j, q, part, total, flight, sums=sums, images=False)
         if part == HEAR:
-            call_topology(padded, line.others, numbers, plan=plan)
+            call_topology(padded, line.others, flight)
     slot = cells.whose[e]
     for k, (c, _) in enumerate(sums):
         sums_of[slot, k] = total[c]
 
 
 def sum_line(
-    oy: int,
-    oz: int,
-    reach: SquaredRanges,
-    at: Decision,
-    flock: FlockRows,
-    numbers: Any,
-    whole: Any,
-    around: WorldArrays,
-    work: Any,
-    cells: SortedCells,
-    ident: Any,
-    sums_of: Any,
-    *,
-    plan: Plan,
-    model: Model,
-    sums: Sums,
-) -> None:
+    oy: int, oz: int, reach: SquaredRanges, at: Decision, flight: FlightView, work: Any, cells: SortedCells, ident: Any,
+    sums_of: Any, *, sums: Sums,
+) -> None:  # fmt: skip
     """The agents of a line of cells, cell by cell."""
-    line = make_line(oy, oz, flock, numbers, work, cells, ident, plan=plan, model=model)
+    plan, flock = flight.plan, flight.flock
+    line = make_line(oy, oz, flight, work, cells, ident)
     # Cells along the line share the slabs that were copied once: the candidates of a cell begin at
     # its left slab and end with its right one.
     for ox in range(cells.count[X]):
@@ -171,15 +138,14 @@ def sum_line(
         for e in range(cells.starts[here], cells.starts[here + 1]):
             if plan.law is None or flock.own("", "law")[cells.whose[e]] == plan.law:
                 sum_agent(
-                    e, line, first, many, padded, ox, here, reach, at, flock, numbers, whole, around, cells, ident,
-                    sums_of, plan=plan, model=model, sums=sums,
+                    e, line, first, many, padded, ox, here, reach, at, flight, cells, ident, sums_of, sums=sums
                 )  # fmt: skip
 
 
 def neighbours_by_cells(
-    flock: FlockRows, numbers: Any, whole: Any, around: WorldArrays, n: int, decision: int, time: float, late: float,
-    work: Any, starts: Any, whose: Any, packed: Any, flat: Any, ident: Any, totals_: Any, sort: Callable[..., Any],
-    widest: Callable[[], Any], *, plan: Plan, model: Model, sums: Sums,
+    flight: FlightView, n: int, decision: int, time: float, late: float, work: Any, starts: Any, whose: Any,
+    packed: Any, flat: Any, ident: Any, totals_: Any, sort: Callable[..., Any], widest: Callable[[], Any],
+    *, sums: Sums,
 ) -> None:  # fmt: skip
     """Sum the neighbour rule over those in the cells around each agent.
 
@@ -188,6 +154,7 @@ def neighbours_by_cells(
     sort           : the stage of this name, for cells no smaller than `near`, about `most_cells`
     widest         : how far the agents see at most where that differs among them, m
     """
+    plan, model, flock, numbers = flight.plan, flight.model, flight.flock, flight.numbers
     range_ = least(numbers.k.range, LIMIT)
     range2 = range_ * range_ + TINY if plan.bits == 64 else range_ * range_
     if not plan.varies("p"):
@@ -209,10 +176,7 @@ def neighbours_by_cells(
     for line in parallel(count[Y] * count[Z]):
         oy, oz = line_position(line, count)
         if plan.law is None:
-            sum_line(
-                oy, oz, reach, at, flock, numbers, whole, around, work, cells, ident, sums_of, plan=plan, model=model,
-                sums=sums,
-            )  # fmt: skip
+            sum_line(oy, oz, reach, at, flight, work, cells, ident, sums_of, sums=sums)
         else:
             # A line without an agent of this law is not copied at all.
             begin = (oz * count[Y] + oy) * count[X]
@@ -220,10 +184,7 @@ def neighbours_by_cells(
             for e in range(cells.starts[begin], cells.starts[begin + count[X]]):
                 some |= flock.own("", "law")[cells.whose[e]] == plan.law
             if some:
-                sum_line(
-                    oy, oz, reach, at, flock, numbers, whole, around, work, cells, ident, sums_of, plan=plan,
-                    model=model, sums=sums,
-                )  # fmt: skip
+                sum_line(oy, oz, reach, at, flight, work, cells, ident, sums_of, sums=sums)
     for chunk in parallel(CHUNKS):
         for i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
             if plan.law is None or flock.own("", "law")[i] == plan.law:

@@ -7,7 +7,7 @@ from airflock.core import radio, random, silence
 from airflock.engine.plan import Plan
 from airflock.engine.stages.air import apart
 from airflock.engine.stages.meet import pair_number
-from airflock.engine.stages.records import Decision, PairLoopAgent
+from airflock.engine.stages.records import Decision, FlightView, PairLoopAgent
 from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import (
     GONE,
@@ -64,9 +64,9 @@ def word(i: int, j: int, decision: int, n: int, whole: Any) -> Any:
     return choose(i & 2 == 0, choose(i & 1 == 0, w0, w1), choose(i & 1 == 0, w2, w3))
 
 
-def drawn_pair_word(me: PairLoopAgent, j: int, at: Decision) -> Any:
+def drawn_pair_word(me: PairLoopAgent, j: int) -> Any:
     """Random word of what agent j sends an agent: of the row that was drawn for it, or drawn here."""
-    return me.words[j] if at.drawn is None else at.drawn(me.i, j)
+    return me.words[j] if me.at.drawn is None else me.at.drawn(me.i, j)
 
 
 def clock_time(time: Any, i: int, flock: FlockRows, *, plan: Plan) -> Any:
@@ -102,10 +102,9 @@ def loss_probability(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
     )
 
 
-def pair_numbers(
-    me: PairLoopAgent, j: int, flock: FlockRows, whole: Any, at: Decision, *, plan: Plan
-) -> dict[str, Any]:
+def pair_numbers(me: PairLoopAgent, j: int, flight: FlightView) -> dict[str, Any]:
     """Draw the random numbers that rules of the radio take for one pair and decision, by name."""
+    plan, flock, whole, at = flight.plan, flight.flock, flight.whole, me.at
     pair = pair_number(me.i, j, at.agents, flock, whole, plan=plan)
     u, g = totals(), totals()
     # Only the numbers that a rule of this radio takes are drawn: each Philox call is a cost for
@@ -123,41 +122,30 @@ def pair_numbers(
 
 
 def update_packet(
-    me: PairLoopAgent,
-    j: int,
-    apart2: Any,
-    carried2: Any,
-    about: dict[str, Any],
-    at: Decision,
-    packet: Any,
-    flock: FlockRows,
-    numbers: Any,
-    whole: Any,
-    *,
-    plan: Plan,
+    me: PairLoopAgent, j: int, apart2: Any, carried2: Any, about: dict[str, Any], packet: Any, flight: FlightView
 ) -> None:
     """Receive what agent j sends, and put the newest packet of it into `packet`, where packets are kept.
 
     apart2, carried2 : squared distance of the two, and squared range of packets, m²
     about            : arguments of the rules of the radio for this pair and decision
     """
-    dims = plan.dimensions
+    plan, flock, numbers, at, dims = flight.plan, flight.flock, flight.numbers, me.at, flight.plan.dimensions
     got = apart2 <= carried2
     if plan.draws:
         miss = loss_probability(about, numbers.k, plan=plan)
-    rolled = pair_numbers(me, j, flock, whole, at, plan=plan)
+    rolled = pair_numbers(me, j, flight)
     if plan.radio.receive is not None:
-        passed = call_receive(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
+        passed = call_receive(me, j, got, {**about, **rolled}, flight)
         got = got & passed
     if plan.draws:
-        got = got & (random.uniform(drawn_pair_word(me, j, at)) >= miss)
+        got = got & (random.uniform(drawn_pair_word(me, j)) >= miss)
     # One packet of a pair is under way at a time, those behind it are dropped, as on a link that
     # repeats until it is acknowledged. A queue would need rows for each place in it.
     if plan.radio.late is not None:
-        queue_packet(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
-        deliver_due(me.i, j, at, packet, flock, numbers, plan=plan)
+        queue_packet(me, j, got, {**about, **rolled}, flight)
+        deliver_due(me, j, packet, flight)
     elif plan.sees:
-        glimpse(me.i, j, got, rolled, at, packet, flock, numbers, plan=plan)
+        glimpse(me, j, got, rolled, packet, flight)
     else:
         for a in range(dims):
             packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][me.i, j])
@@ -167,26 +155,24 @@ def update_packet(
         flock.packet[c][me.i, j] = packet[c]
 
 
-def glimpse(
-    i: int, j: int, got: Any, rolled: dict[str, Any], at: Decision, packet: Any, flock: FlockRows, numbers: Any,
-    *, plan: Plan,
-) -> None:  # fmt: skip
+def glimpse(me: PairLoopAgent, j: int, got: Any, rolled: dict[str, Any], packet: Any, flight: FlightView) -> None:
     """Put the place of agent j into `packet`, by the newest picture that shows it to agent i.
 
     Places are those that agent i believes in, so the error of its own position is in all of them.
     """
+    at, plan, flock, numbers = me.at, flight.plan, flight.flock, flight.numbers
     dims, w = plan.dimensions, numbers.w
     then, off, expected, v, ev = vector(), vector(), vector(), vector(), vector()
-    since = sent_time(i, at, flock, plan=plan) - flock.packet[2 * dims][i, j]
+    since = sent_time(me.i, at, flock, plan=plan) - flock.packet[2 * dims][me.i, j]
     # What is kept is a place in the observer's own frame at the moment of the picture, so that the
     # error of the own position is in both terms and drops out where the law takes the difference.
     for a in range(dims):
-        moved = apart(flock.position[a][i], flock.heard_position[a][i], a, w, plan=plan)
-        then[a] = flock.measured_position[a][i] - moved
-        off[a] = apart(flock.heard_position[a][j], flock.heard_position[a][i], a, w, plan=plan)
-        ev[a] = flock.packet[a + dims][i, j]
-        expected[a] = apart(flock.packet[a][i, j] + ev[a] * since, then[a], a, w, plan=plan)
-        v[a] = flock.measured_velocity[a][i]
+        moved = apart(flock.position[a][me.i], flock.heard_position[a][me.i], a, w, plan=plan)
+        then[a] = flock.measured_position[a][me.i] - moved
+        off[a] = apart(flock.heard_position[a][j], flock.heard_position[a][me.i], a, w, plan=plan)
+        ev[a] = flock.packet[a + dims][me.i, j]
+        expected[a] = apart(flock.packet[a][me.i, j] + ev[a] * since, then[a], a, w, plan=plan)
+        v[a] = flock.measured_velocity[a][me.i]
     t = call_rule(
         plan.radio.see, dx=off[X], dy=off[Y], dz=off[Z], ex=expected[X], ey=expected[Y], ez=expected[Z],
         evx=ev[X], evy=ev[Y], evz=ev[Z], vx=v[X], vy=v[Y], vz=v[Z], since=since, period=numbers.c.period, **rolled,
@@ -195,57 +181,56 @@ def glimpse(
     for a in range(dims):
         # Nothing branches: a picture that does not show the other one leaves the old packet in
         # place.
-        packet[a] = choose(got, then[a] + t[a], flock.packet[a][i, j])
-        packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][i, j])
-    packet[2 * dims] = choose(got, sent_time(i, at, flock, plan=plan), flock.packet[2 * dims][i, j])
+        packet[a] = choose(got, then[a] + t[a], flock.packet[a][me.i, j])
+        packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][me.i, j])
+    packet[2 * dims] = choose(got, sent_time(me.i, at, flock, plan=plan), flock.packet[2 * dims][me.i, j])
 
 
-def call_receive(
-    i: int, j: int, near: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
-) -> Any:
+def call_receive(me: PairLoopAgent, j: int, near: Any, about: dict[str, Any], flight: FlightView) -> Any:
     """Return True if a packet arrives by the radio's own rule; keeps its new Packet where the pair is in range."""
-    age = clock_time(at.time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
+    plan, flock, numbers = flight.plan, flight.flock, flight.numbers
+    age = clock_time(me.at.time, me.i, flock, plan=plan) - flock.packet[2 * plan.dimensions][me.i, j]
     if plan.radio.Packet is not None:
         # What the rule remembers of a pair changes only where the two are in range, as if it had
         # not been called elsewhere.
-        kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][i, j] for c in field_indices(plan.radio.Packet)])
+        kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][me.i, j] for c in field_indices(plan.radio.Packet)])
         hit = call_rule(plan.radio.receive, **about, age=age, packet=kept, k=numbers.k)
         for c in field_indices(plan.radio.Packet):
-            flock.packet[plan.pocket + c][i, j] = choose(near, hit[1][c], flock.packet[plan.pocket + c][i, j])
+            flock.packet[plan.pocket + c][me.i, j] = choose(near, hit[1][c], flock.packet[plan.pocket + c][me.i, j])
     else:
         hit = call_rule(plan.radio.receive, **about, age=age, k=numbers.k)
     return (hit[0] if plan.radio.Packet is not None else hit) > HALF
 
 
-def queue_packet(
-    i: int, j: int, got: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
-) -> None:
+def queue_packet(me: PairLoopAgent, j: int, got: Any, about: dict[str, Any], flight: FlightView) -> None:
     """Put a packet that is not lost on its way, unless another packet of this pair is on its way already."""
+    at, plan, flock, numbers = me.at, flight.plan, flight.flock, flight.numbers
     dims, first, due = plan.dimensions, plan.waiting, 2 * plan.waiting
-    goes = got & (flock.packet[due][i, j] < HALF * GONE)
+    goes = got & (flock.packet[due][me.i, j] < HALF * GONE)
     wait = call_rule(plan.radio.late, **about, k=numbers.k)
-    # The waiting packet lies in rows of its own behind the newest one; both are tables [i, j] that
+    # The waiting packet lies in rows of its own behind the newest one; both are tables [me.i, j] that
     # the pair loop passes in vectors.
     for a in range(dims):
-        flock.packet[first + a][i, j] = choose(goes, flock.heard_position[a][j], flock.packet[first + a][i, j])
-        flock.packet[first + a + dims][i, j] = choose(
-            goes, flock.heard_velocity[a][j], flock.packet[first + a + dims][i, j]
+        flock.packet[first + a][me.i, j] = choose(goes, flock.heard_position[a][j], flock.packet[first + a][me.i, j])
+        flock.packet[first + a + dims][me.i, j] = choose(
+            goes, flock.heard_velocity[a][j], flock.packet[first + a + dims][me.i, j]
         )
-    flock.packet[first + 2 * dims][i, j] = choose(
-        goes, sent_time(j, at, flock, plan=plan), flock.packet[first + 2 * dims][i, j]
+    flock.packet[first + 2 * dims][me.i, j] = choose(
+        goes, sent_time(j, at, flock, plan=plan), flock.packet[first + 2 * dims][me.i, j]
     )
-    flock.packet[due][i, j] = choose(goes, at.time + most(wait, ZERO), flock.packet[due][i, j])
+    flock.packet[due][me.i, j] = choose(goes, at.time + most(wait, ZERO), flock.packet[due][me.i, j])
 
 
-def deliver_due(i: int, j: int, at: Decision, packet: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
+def deliver_due(me: PairLoopAgent, j: int, packet: Any, flight: FlightView) -> None:
     """Deliver the packet on its way if it is due by now, within half a step."""
+    at, plan, flock, numbers = me.at, flight.plan, flight.flock, flight.numbers
     first, due = plan.waiting, 2 * plan.waiting
     # Half a motion step of tolerance: float32 times of send and delay do not add up exactly to a
     # step.
-    come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= at.time + HALF * numbers.c.dt)
+    come = (flock.packet[due][me.i, j] > HALF * GONE) & (flock.packet[due][me.i, j] <= at.time + HALF * numbers.c.dt)
     for c in range(plan.waiting):
-        packet[c] = choose(come, flock.packet[first + c][i, j], flock.packet[c][i, j])
-    flock.packet[due][i, j] = choose(come, GONE, flock.packet[due][i, j])
+        packet[c] = choose(come, flock.packet[first + c][me.i, j], flock.packet[c][me.i, j])
+    flock.packet[due][me.i, j] = choose(come, GONE, flock.packet[due][me.i, j])
 
 
 def extrapolated(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:

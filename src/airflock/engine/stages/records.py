@@ -2,7 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from airflock.core import Model
+from airflock.engine.plan import Plan
+
+if TYPE_CHECKING:
+    from airflock.engine.stages.state import FlockRows
 
 
 @dataclass(frozen=True)
@@ -12,6 +18,24 @@ class WorldArrays:
     edges: Any
     spans: Any
     scene: Any
+
+
+@dataclass(frozen=True)
+class FlightView:
+    """A flight as its stages see it.
+
+    plan, model    : what is known while a driver is made; the law of these stages
+    flock          : rows of all agents
+    numbers, whole : records of numbers by letter, and integers, by name
+    around         : the world as arrays
+    """
+
+    plan: Plan
+    model: Model
+    flock: "FlockRows"
+    numbers: Any
+    whole: Any
+    around: WorldArrays
 
 
 @dataclass(frozen=True)
@@ -31,33 +55,6 @@ class Decision:
     fast: Any
     slow: Any
     drawn: Callable[[int, int], Any] | None
-
-
-@dataclass(frozen=True)
-class PairLoopAgent:
-    """An agent that goes through the others.
-
-    i           : its place in the rows
-    ii, number  : its place among the others, and its number, as wide as real numbers
-    end         : how many the others are, where more are gone through, to fill vectors
-    own, v, h   : where it believes that it is (m), how it moves (m/s) and heads
-    true        : where it is, m
-    p           : its numbers of the law
-    talkers     : how many others talk within the range of its radio
-    words       : random words of what it is sent, by sender
-    """
-
-    i: int
-    ii: Any
-    number: Any
-    end: Any
-    own: Any
-    v: Any
-    h: Any
-    true: Any
-    p: Any
-    talkers: Any
-    words: Any
 
 
 @dataclass(frozen=True)
@@ -92,6 +89,38 @@ class SquaredRanges:
     radio: Any
     radio_: Any
     law: Any
+
+
+@dataclass(frozen=True)
+class PairLoopAgent:
+    """An agent that goes through the others.
+
+    i           : its place in the rows
+    ii, number  : its place among the others, and its number, as wide as real numbers
+    end         : how many the others are, where more are gone through, to fill vectors
+    own, v, h   : where it believes that it is (m), how it moves (m/s) and heads
+    true        : where it is, m
+    p           : its numbers of the law
+    talkers     : how many others talk within the range of its radio
+    words       : random words of what it is sent, by sender
+    others      : rows of those that it goes through
+    reach, at   : its ranges, and the decision
+    """
+
+    i: int
+    ii: Any
+    number: Any
+    end: Any
+    own: Any
+    v: Any
+    h: Any
+    true: Any
+    p: Any
+    talkers: Any
+    words: Any
+    others: CandidateRows
+    reach: SquaredRanges
+    at: Decision
 
 
 @dataclass(frozen=True)
