@@ -171,7 +171,7 @@ class World:
             range(n), range(n), flight, n, step, 0.7, 0.2, state["words"], draw, None, pick, sums=sums,
             images=plan.periodic,
         )  # fmt: skip
-        surfaces.boundaries(range(n), flock, numbers, whole, self.rest["faces"], around, plan=plan, model=model)
+        surfaces.boundaries(range(n), flight, self.rest["faces"])
         deciding.decide(
             range(n), flock, numbers, whole, around, step, 0.7, None, None,
             plan=plan, model=model, summed=fields, walled=words.nonzero_fields(model.Walls, plan.dimensions),
@@ -233,9 +233,10 @@ class World:
             else:
                 metrics = judging.measured_metrics(self.plan, clock)
                 least = judging.measure(
-                    self.flock(work), self.numbers(), self.whole, self.around(), 0.7, n, n, *parts,
+                    FlightView(self.plan, self.plan.model, self.flock(work), self.numbers(), self.whole, self.around()),
+                    0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
-                    plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
+                    metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
                     headed=measure.needs_headings(metrics), summed="xvh",
                 )  # fmt: skip
             found.append((least, values, memory, work))

@@ -27,7 +27,7 @@ from airflock.engine.specialise.known_values import LocalVector, driver_argument
 from airflock.engine.specialise.specialiser import specialise
 from airflock.engine.stages.clusters import call_member, mean_from_sums
 from airflock.engine.stages.measure import add_terms, clear_totals, record_of_totals, reductions
-from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.words import (
     HALF,
     REDUCTION_START,
@@ -159,11 +159,9 @@ def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
     ]
 
 
-def grown(
-    mine: Any, size: Any, mean: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
-) -> Any:  # fmt: skip
+def grown(mine: Any, size: Any, mean: Any, flight: FlightView, n: int, *, metric: Metric) -> Any:
     """Call the cluster rule for the agents that `mine` marks with 1; mean : over the flock."""
-    axes, h = range(plan.dimensions), flock.heading
+    plan, flock, axes, h = flight.plan, flight.flock, range(flight.plan.dimensions), flight.flock.heading
     s, cx, cv, ch = vector(), vector(), vector(), vector()
     for a in axes:
         s[a] = ZERO
@@ -187,13 +185,13 @@ def grown(
     if metric.member is not None:
         clear_totals(k, metric.Member, metric)
         for i in range(n):
-            t = call_member(i, own_mean, flock, numbers, metric=metric)
+            t = call_member(i, own_mean, flight, metric=metric)
             for c, way in enumerate(reductions(metric.Member, metric)):
                 k[c] = reduce_term(way, k[c], t[c] if mine[i] > HALF else REDUCTION_START[way])
     members = record_of_totals(metric.Member, k) if metric.member is not None else None
     return call_rule(
         metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members, mean=own_mean,
-        q=numbers.q,
+        q=flight.numbers.q,
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from airflock.engine.stages.measure import (
     record_of_totals,
     shared_record,
 )
-from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.words import (
     ONE,
     ZERO,
@@ -35,11 +35,9 @@ from airflock.engine.stages.words import (
 )  # fmt: skip
 
 
-def expand_agent(
-    e: int, state: Any, expanded: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
-) -> Any:
+def expand_agent(e: int, state: Any, expanded: Any, flight: FlightView, n: int, *, metric: Metric) -> Any:
     """Add the agents that are linked to agent e, and in no cluster yet, to the growing cluster; return their number."""
-    own = vector()
+    plan, flock, numbers, own = flight.plan, flight.flock, flight.numbers, vector()
     for a in range(plan.dimensions):
         own[a] = flock.position[a][e]
     expanded[e] = 1
@@ -68,23 +66,14 @@ def first_unexpanded(state: Any, expanded: Any, n: int) -> Any:
 
 
 def grow_cluster(
-    first: int,
-    done: int,
-    state: Any,
-    expanded: Any,
-    flock: FlockRows,
-    numbers: Any,
-    n: int,
-    *,
-    plan: Plan,
-    metric: Metric,
+    first: int, done: int, state: Any, expanded: Any, flight: FlightView, n: int, *, metric: Metric
 ) -> Any:
     """Let the cluster of agent `first` grow, where earlier ones hold `done` agents; returns how many it holds."""
     state[first] = 1
     size = 1
     e = first
     while e >= 0:
-        fresh = expand_agent(e, state, expanded, flock, numbers, n, plan=plan, metric=metric)
+        fresh = expand_agent(e, state, expanded, flight, n, metric=metric)
         size += fresh
         # Mostly one cluster holds everybody; then the rest need not be expanded.
         if done + size == n:
@@ -93,10 +82,11 @@ def grow_cluster(
     return size
 
 
-def call_member(i: int, mean: Any, flock: FlockRows, numbers: Any, *, metric: Metric) -> Any:
+def call_member(i: int, mean: Any, flight: FlightView, *, metric: Metric) -> Any:
     """Call the member rule of a metric for agent i; mean : over its cluster."""
+    flock = flight.flock
     pair = shared_record(metric.Pair, flock.pair, i, metric) if rule_asks(metric.member, "pair") else None
-    return call_rule(metric.member, **agent_arguments(i, flock), pair=pair, mean=mean, q=numbers.q)
+    return call_rule(metric.member, **agent_arguments(i, flock), pair=pair, mean=mean, q=flight.numbers.q)
 
 
 def mean_from_sums(size: int, s: Any, v: Any, h: Any, mean: Any, *, plan: Plan, metric: Metric) -> Any:
@@ -113,8 +103,9 @@ def mean_from_sums(size: int, s: Any, v: Any, h: Any, mean: Any, *, plan: Plan, 
     )
 
 
-def cluster_mean(size: int, mean: Any, state: Any, flock: FlockRows, n: int, *, plan: Plan, metric: Metric) -> Any:
+def cluster_mean(size: int, mean: Any, state: Any, flight: FlightView, n: int, *, metric: Metric) -> Any:
     """Means of the cluster that has grown, which has so many members; those of the flock where no rule is for them."""
+    plan, flock = flight.plan, flight.flock
     cx, cv, ch = vector(), vector(), vector()
     if metric.member is not None:
         for total in (cx, cv, ch):
@@ -129,7 +120,7 @@ def cluster_mean(size: int, mean: Any, state: Any, flock: FlockRows, n: int, *, 
     return mean_from_sums(size, cx, cv, ch, mean, plan=plan, metric=metric)
 
 
-def sum_members(mean: Any, state: Any, flock: FlockRows, numbers: Any, n: int, *, metric: Metric) -> Any:
+def sum_members(mean: Any, state: Any, flight: FlightView, n: int, *, metric: Metric) -> Any:
     """Sum the member rule of a metric over the cluster that has grown."""
     k = totals()
     if metric.member is not None:
@@ -138,19 +129,17 @@ def sum_members(mean: Any, state: Any, flock: FlockRows, numbers: Any, n: int, *
         # first.
         for j in range(n):
             if state[j] == 1:
-                t = call_member(j, mean, flock, numbers, metric=metric)
+                t = call_member(j, mean, flight, metric=metric)
                 add_terms(k, t, metric.Member, metric)
     return record_of_totals(metric.Member, k) if metric.member is not None else None
 
 
-def sum_clusters(
-    metric: Metric, mean: Any, flock: FlockRows, numbers: Any, n: int, m: int, labels: Any, *, plan: Plan
-) -> Any:
+def sum_clusters(metric: Metric, mean: Any, flight: FlightView, n: int, m: int, labels: Any) -> Any:
     """Sum the cluster rule of a metric over all clusters.
 
     labels : two rows of integers: `state` and `expanded`
     """
-    axes, h = range(plan.dimensions), flock.heading
+    axes, h = range(flight.plan.dimensions), flight.flock.heading
     u = totals()
     if metric.cluster is not None:
         state = labels[0]
@@ -168,7 +157,7 @@ def sum_clusters(
             # one pass over the flock in all.
             while state[first] != 0:
                 first += 1
-            size = grow_cluster(first, done, state, expanded, flock, numbers, n, plan=plan, metric=metric)
+            size = grow_cluster(first, done, state, expanded, flight, n, metric=metric)
             s = vector()
             for a in axes:
                 s[a] = ZERO
@@ -184,15 +173,15 @@ def sum_clusters(
                 # them by state 1.
                 if metric.member is None:
                     state[j] = integer(2) if state[j] != 0 else integer(0)
-            own_mean = cluster_mean(size, mean, state, flock, n, plan=plan, metric=metric)
-            members = sum_members(own_mean, state, flock, numbers, n, metric=metric)
+            own_mean = cluster_mean(size, mean, state, flight, n, metric=metric)
+            members = sum_members(own_mean, state, flight, n, metric=metric)
             if metric.member is not None:
                 for j in range(n):
                     state[j] = integer(2) if state[j] != 0 else integer(0)
             done += size
             t = call_rule(
                 metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members,
-                mean=own_mean, q=numbers.q,
+                mean=own_mean, q=flight.numbers.q,
             )  # fmt: skip
             add_terms(u, t, metric.Cluster, metric)
     return record_of_totals(metric.Cluster, u) if metric.cluster is not None else None

@@ -9,25 +9,15 @@ import math
 from typing import Any
 
 from airflock.core import Mean, Metric
-from airflock.engine.plan import Plan
 from airflock.engine.stages.clusters import call_member, mean_from_sums
 from airflock.engine.stages.measure import add_terms, clear_totals, record_of_totals
 from airflock.engine.stages.near import apart, cell_position, wrap_cell
-from airflock.engine.stages.records import GrowingClusters, SortedCells
-from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.records import FlightView, GrowingClusters, SortedCells
 from airflock.engine.stages.words import ZERO, X, Y, Z, call_rule, real, totals, vector
 
 
 def join_cell(
-    here: int,
-    tail: int,
-    own: Any,
-    numbers: Any,
-    cells: SortedCells,
-    grown: GrowingClusters,
-    *,
-    plan: Plan,
-    metric: Metric,
+    here: int, tail: int, own: Any, flight: FlightView, cells: SortedCells, grown: GrowingClusters, *, metric: Metric
 ) -> Any:
     """Add the linked agents of one cell to the growing cluster; return the new length of `reached`."""
     k = cells.starts[here]
@@ -35,9 +25,9 @@ def join_cell(
     while k < end:
         f = grown.places[k]
         d = vector()
-        r2 = apart(d, own, cells.flat, f, numbers.w, plan=plan)
+        r2 = apart(d, own, cells.flat, f, flight)
         r = math.sqrt(r2)
-        if call_rule(metric.linked, r=r, r2=r2, q=numbers.q):
+        if call_rule(metric.linked, r=r, r2=r2, q=flight.numbers.q):
             # An agent that joins is swapped behind those left in the cell, so no agent is visited
             # twice, however dense the flock.
             end -= 1
@@ -52,18 +42,10 @@ def join_cell(
 
 
 def expand_member(
-    f: int,
-    own_cell: int,
-    tail: int,
-    numbers: Any,
-    cells: SortedCells,
-    grown: GrowingClusters,
-    *,
-    plan: Plan,
-    metric: Metric,
+    f: int, own_cell: int, tail: int, flight: FlightView, cells: SortedCells, grown: GrowingClusters, *, metric: Metric
 ) -> Any:
     """Add the linked agents of all cells around the agent at place f; return the new length of `reached`."""
-    own, at, low, high, count = vector(), vector(), vector(), vector(), cells.count
+    plan, own, at, low, high, count = flight.plan, vector(), vector(), vector(), vector(), cells.count
     for a in range(plan.dimensions):
         own[a] = cells.flat[a, f]
     cell_position(at, own_cell, count)
@@ -81,24 +63,15 @@ def expand_member(
             row = wrap_cell(qz, count[Z], plan=plan) * count[Y] + wrap_cell(qy, count[Y], plan=plan)
             for qx in range(low[X], high[X]):
                 here = row * count[X] + wrap_cell(qx, count[X], plan=plan)
-                tail = join_cell(here, tail, own, numbers, cells, grown, plan=plan, metric=metric)
+                tail = join_cell(here, tail, own, flight, cells, grown, metric=metric)
     return tail
 
 
 def cluster_sums(
-    done: int,
-    tail: int,
-    s: Any,
-    v: Any,
-    h: Any,
-    flock: FlockRows,
-    whose: Any,
-    reached: Any,
-    *,
-    plan: Plan,
-    metric: Metric,
+    done: int, tail: int, s: Any, v: Any, h: Any, flight: FlightView, whose: Any, reached: Any, *, metric: Metric
 ) -> Any:
     """Sums of position, velocity and heading of a cluster, into vectors; returns that of squared headings."""
+    plan, flock = flight.plan, flight.flock
     for a in range(plan.dimensions):
         h[a] = ZERO
     if metric.member is not None:
@@ -121,7 +94,7 @@ def cluster_sums(
 
 
 def sum_members(
-    done: int, tail: int, mean: Any, flock: FlockRows, numbers: Any, whose: Any, reached: Any, *, metric: Metric
+    done: int, tail: int, mean: Any, flight: FlightView, whose: Any, reached: Any, *, metric: Metric
 ) -> Any:  # fmt: skip
     """Sum the member rule of a metric over a cluster."""
     k = totals()
@@ -130,23 +103,13 @@ def sum_members(
         # Members lie side by side in `reached`: no other agent is visited.
         for e in range(done, tail):
             j = whose[reached[e]]
-            t = call_member(j, mean, flock, numbers, metric=metric)
+            t = call_member(j, mean, flight, metric=metric)
             add_terms(k, t, metric.Member, metric)
     return record_of_totals(metric.Member, k) if metric.member is not None else None
 
 
 def clusters_by_cells(
-    metric: Metric,
-    mean: Mean,
-    flock: FlockRows,
-    numbers: Any,
-    n: int,
-    labels: Any,
-    cells: SortedCells,
-    tally: Any,
-    ident: Any,
-    *,
-    plan: Plan,
+    metric: Metric, mean: Mean, flight: FlightView, n: int, labels: Any, cells: SortedCells, tally: Any, ident: Any
 ) -> Any:
     """Sum the cluster rule of one metric over all clusters, by cells that are no smaller than links are long.
 
@@ -175,15 +138,15 @@ def clusters_by_cells(
             # `reached` is the queue of the search, and its finished part the list of members: e
             # follows, tail leads.
             while e < tail:
-                tail = expand_member(reached[e], cell[e], tail, numbers, cells, grown, plan=plan, metric=metric)
+                tail = expand_member(reached[e], cell[e], tail, flight, cells, grown, metric=metric)
                 e += 1
             s, v, h = vector(), vector(), vector()
-            hh = cluster_sums(done, tail, s, v, h, flock, cells.whose, reached, plan=plan, metric=metric)
-            own_mean = mean_from_sums(tail - done, s, v, h, mean, plan=plan, metric=metric)
-            members = sum_members(done, tail, own_mean, flock, numbers, cells.whose, reached, metric=metric)
+            hh = cluster_sums(done, tail, s, v, h, flight, cells.whose, reached, metric=metric)
+            own_mean = mean_from_sums(tail - done, s, v, h, mean, plan=flight.plan, metric=metric)
+            members = sum_members(done, tail, own_mean, flight, cells.whose, reached, metric=metric)
             t = call_rule(
                 metric.cluster, n=real(tail - done), hx=h[X], hy=h[Y], hz=h[Z], hh=hh, members=members, mean=own_mean,
-                q=numbers.q,
+                q=flight.numbers.q,
             )  # fmt: skip
             add_terms(u, t, metric.Cluster, metric)
             done = tail

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from airflock.core import Mean, Metric, norm
 from airflock.engine.plan import Plan
-from airflock.engine.stages.records import WorldArrays
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.scene import find_contacts
 from airflock.engine.stages.state import Axes, FlockRows, record_from_table
 from airflock.engine.stages.words import (
@@ -143,9 +143,8 @@ def offset(d: Any, own: Any, x: Axes, j: int, w: Any, *, plan: Plan) -> Any:
 
 
 def sum_pairs(
-    flock: FlockRows, numbers: Any, n: int, m: int, *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
-    abreast: bool,
-) -> Any:  # fmt: skip
+    flight: FlightView, n: int, m: int, *, metrics: tuple[MeasuredMetric, ...], nearest: bool, abreast: bool
+) -> Any:
     """Sum the pair rules of all metrics over the others of each agent; returns the least squared distance, m².
 
     nearest : whether the least distance is needed; only then, as two minima of the same squares in one loop are not
@@ -161,10 +160,10 @@ def sum_pairs(
             for h in range((n + 1) // 2):
                 i = 2 * h
                 last = min(i + 1, n - 1)  # of an odd flock the last one goes with itself
-                near2 = sum_pairs_of((i, last), flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
+                near2 = sum_pairs_of((i, last), flight, n, m, metrics=metrics, nearest=nearest)
         else:
             for i in range(n):
-                near2 = sum_pairs_of((i,), flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
+                near2 = sum_pairs_of((i,), flight, n, m, metrics=metrics, nearest=nearest)
                 # The collision clock alone needs the least distance: adding this second minimum to
                 # every sample took 7.9 µs instead of 0.95 µs for 50 boids.
                 if nearest:
@@ -173,10 +172,10 @@ def sum_pairs(
 
 
 def sum_pairs_of(
-    agents: tuple[int, ...], flock: FlockRows, numbers: Any, n: int, m: int,
-    *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
-) -> Any:  # fmt: skip
+    agents: tuple[int, ...], flight: FlightView, n: int, m: int, *, metrics: tuple[MeasuredMetric, ...], nearest: bool
+) -> Any:
     """Sum the pair rules for these agents, one or two; return the least squared distance, m²."""
+    plan, flock, numbers = flight.plan, flight.flock, flight.numbers
     axes, x = range(plan.dimensions), flock.position
     paired = [one for one in metrics if one.metric.pair is not None]
     own, other, sums, others = vector(), vector(), totals(), totals()
@@ -224,32 +223,22 @@ def agent_arguments(i: int, flock: FlockRows) -> Any:
     }  # fmt: skip
 
 
-def call_agent_rule(
-    i: int, pair: Any, shared: Any, kept: Any, mean: Any, flock: FlockRows, numbers: Any, *, metric: Metric
-) -> Any:  # fmt: skip
+def call_agent_rule(i: int, pair: Any, shared: Any, kept: Any, mean: Any, flight: FlightView, *, metric: Metric) -> Any:
     """Call the agent rule of a metric for agent i; returns its terms and, where it has a memory, the new memory."""
+    flock, numbers = flight.flock, flight.numbers
     return call_rule(
-        metric.agent,
-        **agent_arguments(i, flock),
-        excursion=flock.excursion[i],
-        touches=flock.touches[i],
-        rays=flock.rays[i],
-        pair=pair,
-        shared=shared,
-        memory=kept,
-        mean=mean,
-        wing=numbers.wing,
-        q=numbers.q,
-    )
+        metric.agent, **agent_arguments(i, flock), excursion=flock.excursion[i], touches=flock.touches[i],
+        rays=flock.rays[i], pair=pair, shared=shared, memory=kept, mean=mean, wing=numbers.wing, q=numbers.q,
+    )  # fmt: skip
 
 
-def sum_agents(metric: Metric, row: int, mean: Any, flock: FlockRows, numbers: Any, n: int, memory: Any) -> Any:
+def sum_agents(metric: Metric, row: int, mean: Any, flight: FlightView, n: int, memory: Any) -> Any:
     """Sum the agent rule of a metric over all agents.
 
     mean        : over the flock
     memory, row : table of what metrics remember, by row and agent, and the first row of this one
     """
-    total = totals()
+    flock, total = flight.flock, totals()
     if metric.agent is not None:
         clear_totals(total, metric.Agent, metric)
         # One agent after another, over true states: pairs and surveys have filled their columns
@@ -263,38 +252,21 @@ def sum_agents(metric: Metric, row: int, mean: Any, flock: FlockRows, numbers: A
             # there.
             if rule_asks(metric.agent, "memory"):
                 before = record_from_table(i, metric.Memory, memory, row)
-                t, kept = call_agent_rule(i, pair, shared, before, mean, flock, numbers, metric=metric)
+                t, kept = call_agent_rule(i, pair, shared, before, mean, flight, metric=metric)
                 for c in field_indices(metric.Memory):
                     memory[row + c, i] = kept[c]
             else:
-                t = call_agent_rule(i, pair, shared, None, mean, flock, numbers, metric=metric)
+                t = call_agent_rule(i, pair, shared, None, mean, flight, metric=metric)
             add_terms(total, t, metric.Agent, metric)
     return record_of_totals(metric.Agent, total) if metric.agent is not None else None
 
 
 def measure(
-    flock: FlockRows,
-    numbers: Any,
-    whole: Any,
-    around: WorldArrays,
-    time: float,
-    n: int,
-    m: int,
-    memory: Any,
-    labels: Any,
-    values: Any,
-    excursion: Callable[..., Any],
-    survey: Mapping[str, Callable[[], None]],
-    clustered: Mapping[str, Callable[..., Any]],
-    *,
-    plan: Plan,
-    metrics: tuple[MeasuredMetric, ...],
-    nearest: bool,
-    over: Callable[[], Any] | None,
-    abreast: bool,
-    headed: bool,
-    summed: str,
-) -> Any:
+    flight: FlightView, time: float, n: int, m: int, memory: Any, labels: Any, values: Any,
+    excursion: Callable[..., Any], survey: Mapping[str, Callable[[], None]],
+    clustered: Mapping[str, Callable[..., Any]], *, metrics: tuple[MeasuredMetric, ...], nearest: bool,
+    over: Callable[[], Any] | None, abreast: bool, headed: bool, summed: str,
+) -> Any:  # fmt: skip
     """Write what metrics sample at one instant into `values`; returns the least distance of a pair, m.
 
     memory, labels : what metrics remember, by row and agent; two rows of integers, scratch
@@ -307,7 +279,7 @@ def measure(
     summed         : of what the flock's mean is taken: position x, velocity v, heading h
     over           : what goes through pairs by cells; None: all pairs
     """
-    x = flock.position
+    plan, flock, whole, around, x = flight.plan, flight.flock, flight.whole, flight.around, flight.flock.position
     if headed:  # noqa: SIM108 - a helper of several lines stands where it is assigned
         mean = fill_headings(flock, n, plan=plan, summed=summed)
     else:
@@ -317,26 +289,26 @@ def measure(
     if over is not None:  # noqa: SIM108 - a helper of several lines stands where it is assigned
         least2 = over()
     else:
-        least2 = sum_pairs(flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest, abreast=abreast)
+        least2 = sum_pairs(flight, n, m, metrics=metrics, nearest=nearest, abreast=abreast)
     if any(rule_asks(one.metric.agent, "excursion") for one in metrics):
         for i in range(n):
             flock.excursion[i] = excursion(
-                x[X][i], x[Y][i], x[Z][i], numbers.w, around.edges, around.spans, whole.corners, whole.obstacles,
+                x[X][i], x[Y][i], x[Z][i], flight.numbers.w, around.edges, around.spans, whole.corners, whole.obstacles,
                 around.scene,
             )  # fmt: skip
     if any(rule_asks(one.metric.agent, "touches") for one in metrics):
-        find_contacts(flock, numbers, n, around.scene, plan=plan)
+        find_contacts(flock, flight.numbers, n, around.scene, plan=plan)
     for one in metrics:
         if one.metric.survey is not None:
             survey[one.metric.name]()
     # The engine knows no metric by name: a metric set brings its rules, its parameters and its
     # fitness.
     for metric, value, row, _ in metrics:
-        agents = sum_agents(metric, row, mean, flock, numbers, n, memory)
-        clusters = clustered[metric.name](metric, mean, flock, numbers, n, m, labels, plan=plan)
+        agents = sum_agents(metric, row, mean, flight, n, memory)
+        clusters = clustered[metric.name](metric, mean, flight, n, m, labels)
         t = call_rule(
             metric.sample, n=real(n), mean=mean, agents=agents, clusters=clusters, dimensions=real(plan.dimensions),
-            time=time, q=numbers.q,
+            time=time, q=flight.numbers.q,
         )  # fmt: skip
         for c in field_indices(metric.Sample):
             values[value + c] = t[c]

@@ -11,8 +11,7 @@ import numpy as np
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.measure import MeasuredMetric, field_names, reductions
-from airflock.engine.stages.records import HomeCell, SortedCells
-from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.records import FlightView, HomeCell, SortedCells
 from airflock.engine.stages.words import (
     FAR,
     HALF_SIZES,
@@ -59,8 +58,9 @@ def wrap_cell(c: Any, count: Any, *, plan: Plan) -> Any:
     return c + (count if c < 0 else 0) - (count if c >= count else 0) if plan.periodic else c
 
 
-def apart(d: Any, own: Any, flat: Any, f: int, w: Any, *, plan: Plan) -> Any:
+def apart(d: Any, own: Any, flat: Any, f: int, flight: FlightView) -> Any:
     """Put the offset from a place to the agent at place f into the vector d, m; returns its square, m²."""
+    plan, w = flight.plan, flight.numbers.w
     # Reads sorted rows by component and place, so that a run of places is read in order.
     for a in range(plan.dimensions):
         d[a] = flat[a, f] - own[a]
@@ -71,33 +71,21 @@ def apart(d: Any, own: Any, flat: Any, f: int, w: Any, *, plan: Plan) -> Any:
 
 
 def sum_run(
-    first: Any,
-    last: Any,
-    e: int,
-    ii: Any,
-    near2: Any,
-    own: Any,
-    sums: Any,
-    flock: FlockRows,
-    numbers: Any,
-    cells: SortedCells,
-    *,
-    plan: Plan,
-    paired: list[MeasuredMetric],
-    nearest: bool,
-) -> Any:
+    first: Any, last: Any, e: int, ii: Any, near2: Any, own: Any, sums: Any, flight: FlightView, cells: SortedCells,
+    *, paired: list[MeasuredMetric], nearest: bool,
+) -> Any:  # fmt: skip
     """Add all pairs with those at places first to last - 1 to the sums of the agent at place e; its least square."""
     # A run of places that lie side by side: the inner loop of this search, written like that over
     # all pairs.
     for f in range(first, last):
         d = vector()
-        r2 = apart(d, own, cells.flat, f, numbers.w, plan=plan)
+        r2 = apart(d, own, cells.flat, f, flight)
         r = math.sqrt(r2)
         ok = f != e
         for metric, _, _, start in paired:
             t = call_rule(
-                metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
-                lower=(ONE if integer(flock.number[cells.whose[f]]) < ii else ZERO),
+                metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=flight.numbers.q,
+                lower=(ONE if integer(flight.flock.number[cells.whose[f]]) < ii else ZERO),
             )  # fmt: skip
             for c, way in enumerate(reductions(metric.Pair, metric)):
                 sums[start + c] = reduce_term(way, sums[start + c], choose(ok, t[c], REDUCTION_START[way]))
@@ -107,26 +95,14 @@ def sum_run(
 
 
 def in_ring(
-    ring: int,
-    home: HomeCell,
-    e: int,
-    ii: Any,
-    near2: Any,
-    own: Any,
-    sums: Any,
-    flock: FlockRows,
-    numbers: Any,
-    cells: SortedCells,
-    *,
-    plan: Plan,
-    paired: list[MeasuredMetric],
-    nearest: bool,
-) -> Any:
+    ring: int, home: HomeCell, e: int, ii: Any, near2: Any, own: Any, sums: Any, flight: FlightView, cells: SortedCells,
+    *, paired: list[MeasuredMetric], nearest: bool,
+) -> Any:  # fmt: skip
     """Add the pairs with all agents in one ring of cells around the own cell; the first ring includes its inside.
 
     Cells side by side along x are one run of places; a run that goes over the ends of a periodic box is cut there.
     """
-    at, low, high, count, starts = home.at, home.low, home.high, cells.count, cells.starts
+    plan, at, low, high, count, starts = flight.plan, home.at, home.low, home.high, cells.count, cells.starts
     # The ring is a shell of cells: full rows on its top, bottom and sides, and of the rows through
     # its middle the two ends. The first ring also takes the cell itself and those beside it.
     for oz in range(max(-ring, low[Z]), min(ring, high[Z]) + 1):
@@ -146,7 +122,7 @@ def in_ring(
                     if begin < stop:
                         near2 = sum_run(
                             starts[row * count[X] + begin], starts[row * count[X] + stop], e, ii, near2, own, sums,
-                            flock, numbers, cells, plan=plan, paired=paired, nearest=nearest,
+                            flight, cells, paired=paired, nearest=nearest,
                         )  # fmt: skip
     return near2
 
@@ -166,14 +142,14 @@ def unsettled(beyond: Any, near2: Any, sums: Any, numbers: Any, *, paired: list[
 
 
 def sum_pairs_of_place(
-    e: int, home: HomeCell, flock: FlockRows, numbers: Any, cells: SortedCells, side: Any, rings: int,
-    *, plan: Plan, paired: list[MeasuredMetric], nearest: bool,
+    e: int, home: HomeCell, flight: FlightView, cells: SortedCells, side: Any, rings: int,
+    *, paired: list[MeasuredMetric], nearest: bool,
 ) -> Any:  # fmt: skip
     """Sum the pair rules for the agent at place e, ring by ring; returns the square of its least distance, m²."""
     i = cells.whose[e]
-    ii = integer(flock.number[i])
+    ii = integer(flight.flock.number[i])
     own, sums = vector(), totals()
-    for a in range(plan.dimensions):
+    for a in range(flight.plan.dimensions):
         own[a] = cells.flat[a, e]
     for metric, _, _, first in paired:
         for c, way in enumerate(reductions(metric.Pair, metric)):
@@ -184,28 +160,25 @@ def sum_pairs_of_place(
     # Rings grow until each metric's `settled` holds: a nearest neighbour is known after one ring in
     # a dense flock. A rule that says so too early gives wrong numbers, as a wrong `within` does.
     while going == 1:
-        near2 = in_ring(
-            ring, home, e, ii, near2, own, sums, flock, numbers, cells, plan=plan, paired=paired, nearest=nearest
-        )  # fmt: skip
+        near2 = in_ring(ring, home, e, ii, near2, own, sums, flight, cells, paired=paired, nearest=nearest)
         beyond = real(ROUNDING_MARGIN) * real(ring) * side
-        open_ = unsettled(beyond, near2, sums, numbers, paired=paired, nearest=nearest)
+        open_ = unsettled(beyond, near2, sums, flight.numbers, paired=paired, nearest=nearest)
         going = open_ if ring < rings else 0
         ring += 1
     for metric, _, _, first in paired:
         for c, name in enumerate(field_names(metric.Pair)):
-            flock.pair(metric.name, name)[i] = sums[first + c]
+            flight.flock.pair(metric.name, name)[i] = sums[first + c]
     return near2
 
 
 def pairs_by_cells(
-    flock: FlockRows, numbers: Any, cells: SortedCells, sides: Any,
-    *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
-) -> Any:  # fmt: skip
+    flight: FlightView, cells: SortedCells, sides: Any, *, metrics: tuple[MeasuredMetric, ...], nearest: bool
+) -> Any:
     """Sum the pair rules by cells, as `sum_pairs` does, for metrics that say when their pairs are `settled`.
 
     sides : size of a cell along each axis, m
     """
-    paired = [one for one in metrics if one.metric.pair is not None]
+    plan, paired = flight.plan, [one for one in metrics if one.metric.pair is not None]
     count, starts = cells.count, cells.starts
     total = count[X] * count[Y] * count[Z]
     side = sides[X]
@@ -229,9 +202,7 @@ def pairs_by_cells(
                     low[a] = -((count[a] - 1) // 2) if plan.periodic else -at[a]
                     high[a] = count[a] // 2 if plan.periodic else count[a] - 1 - at[a]
                 for e in range(starts[here], starts[here + 1]):
-                    near2 = sum_pairs_of_place(
-                        e, home, flock, numbers, cells, side, rings, plan=plan, paired=paired, nearest=nearest
-                    )  # fmt: skip
+                    near2 = sum_pairs_of_place(e, home, flight, cells, side, rings, paired=paired, nearest=nearest)
                     if nearest:
                         part2 = least(part2, near2)
         nearest2[part] = part2
