@@ -21,6 +21,7 @@ from airflock.studio.page_panels import (
 from airflock.studio.page_scene import PageScene
 from airflock.studio.player import Player
 
+
 class FlightPage(LivePage):
     """Page that flies the flights of a player."""
 

@@ -355,9 +355,7 @@ class PageScene(AgentScene):
         tone = self.colouring.of(flocks, velocity, self.top, self.stages[0].height).colours
         self._flash(tone)
         there = np.concatenate([flock.side.flight.present for flock in flocks])
-        self.draw_agents(
-            position, velocity, tone, there, selected, lambda before: self._trail_starts(before, position)
-        )
+        self.draw_agents(position, velocity, tone, there, selected, lambda before: self._trail_starts(before, position))
         links = [flock.links(self.links) for flock in flocks]
         self.view.extra("links", np.vstack([points for points, _ in links]), np.vstack([tones for _, tones in links]))
 
