@@ -147,7 +147,11 @@ def _entry(
         )
     if when is None or numbers is None or who is INVALID:
         return None
-    errors.add(*_end_errors(where, when, kind, numbers))
+    ends = when.lasts is not None or (when.at is not None and when.until is not None)
+    if ends and kind.time_to_absence(numbers) <= 0.0:
+        errors.add(
+            f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
+        )
     count = 1 if when.number is None and when.per_hour is not None else when.number
     return FaultEntry(
         kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
@@ -210,17 +214,6 @@ def _time_errors(where: str, when: FaultTiming, may: int) -> list[str]:
     return errors
 
 
-def _end_errors(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
-    """Return why a fault cannot end."""
-    errors = []
-    ends = when.lasts is not None or (when.at is not None and when.until is not None)
-    if ends and kind.time_to_absence(numbers) <= 0.0:
-        errors.append(
-            f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
-        )
-    return errors
-
-
 # Rates count for the flock and not for each agent: "a motor fails once an hour" is what people know
 # of a fleet.
 ENDLESS = 1e9  # s; how long a fault lasts that does not end
@@ -249,10 +242,8 @@ class FaultOnset(NamedTuple):
 
 def draw_onsets(scenario: "Scenario", seed: int, world: int = 0) -> tuple[FaultOnset, ...]:
     """Draw all fault onsets of a flight, in the order of their steps."""
-    onsets: list[FaultOnset] = []
-    for number, entry in enumerate(scenario.faults):
-        onsets += _onsets_of_entry(scenario, entry, number, seed, world)
-    return _in_order(onsets)
+    entries = enumerate(scenario.faults)
+    return _in_order([o for number, entry in entries for o in _onsets_of_entry(scenario, entry, number, seed, world)])
 
 
 def merge_onsets(

@@ -225,11 +225,7 @@ class Scenario:
     @cached_property
     def law_indices(self) -> tuple[int, ...]:
         """Index in `laws` of each agent's law."""
-        indices = [0] * self.agents
-        for number, law in enumerate(self.laws[1:], 1):
-            for agent in law.agents:
-                indices[agent] = number
-        return tuple(indices)
+        return self._numbered([law.agents for law in self.laws])
 
     def law_of(self, agent: int) -> FlownLaw:
         """Return the law that an agent flies by."""
@@ -238,9 +234,13 @@ class Scenario:
     @cached_property
     def group_indices(self) -> tuple[int, ...]:
         """Number of each agent's group in [[groups]]; -1 where it is in none."""
+        return self._numbered([group.agents for group in self.groups])
+
+    def _numbered(self, members: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Return the number of the list that each agent is in; -1 where it is in none."""
         indices = [-1] * self.agents
-        for number, group in enumerate(self.groups):
-            for agent in group.agents:
+        for number, agents in enumerate(members):
+            for agent in agents:
                 indices[agent] = number
         return tuple(indices)
 

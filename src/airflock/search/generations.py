@@ -229,16 +229,6 @@ def refuse_flat(study: Study, store: FlightStore, generation: int, values: Seque
         )
 
 
-def dead_reason(study: Study, scores: Sequence[Mapping[str, Any] | None]) -> str:
-    """Return why a winner does not fly, if its fitness, a product, is zero in all fresh flights; else empty."""
-    sound = [row for row in scores if row is not None]
-    if study.objectives[0].name != "fitness" or not sound or not _parts(sound):
-        return ""
-    if max(float(row["fitness"]) for row in sound) >= ZERO_FITNESS:
-        return ""
-    return f"no candidate flies, so there is no best one{zero_fitness_reason(sound)}"
-
-
 def search_scores(store: FlightStore) -> list[Mapping[str, Any]]:
     """Return the scores of all flights of the search."""
     return [
@@ -426,7 +416,7 @@ def conclude_study(
     # The best value of the search is the luckiest, so the winner is scored on seeds that have
     # chosen nothing.
     safe = _safe(study, sound)
-    good = _as_good(study, safe, mean)
+    good = safe[safe[first.name] >= mean] if first.maximise else safe[safe[first.name] <= mean]
     result = EvolveResult(
         folder=folder,
         scenario=with_parameters(study.scenario, winner),
@@ -444,7 +434,7 @@ def conclude_study(
         failed=int(table[first.name].isna().sum()),
         reasons=store.reasons(),
         finalists=finalist_table(study, points, origins, rows),
-        dead_reason=_dead(study, flown),
+        dead_reason=dead_reason(study, flown),
         scenarios=each,
         limits=tuple(limit_reports(study, [flown[0, r] for r in range(len(unbiased) * len(study.scenarios))])),
     )
@@ -475,16 +465,7 @@ def _safe(study: Study, sound: pd.DataFrame) -> pd.DataFrame:
     return sound
 
 
-def _as_good(study: Study, candidates: pd.DataFrame, fitness: float) -> pd.DataFrame:
-    """Return the candidates of the search that reach a fitness."""
-    first = study.objectives[0]
-    reached = candidates[first.name] >= fitness if first.maximise else candidates[first.name] <= fitness
-    return candidates[reached]
-
-
-def _scored(
-    study: Study, flown: Mapping[tuple[int, int], Mapping[str, Any] | None]
-) -> tuple[list[float], dict[str, tuple[float, float, float]]]:
+def _scored(study: Study, flown: FlightScores) -> tuple[list[float], dict[str, tuple[float, float, float]]]:
     """Return the fitness of the winner's flights, one number a seed, and the interval in each of several scenarios.
 
     Over scenarios it is the mean in all of them on one seed, or that in the scenario whose mean is
@@ -503,13 +484,16 @@ def _scored(
     return values.tolist(), {label: (mean, low, high) for label, (mean, _, low, high) in each.items()}
 
 
-def _dead(study: Study, flown: Mapping[tuple[int, int], Mapping[str, Any] | None]) -> str:
-    """Return why the winner does not fly in the first such scenario; else empty."""
+def dead_reason(study: Study, flown: FlightScores) -> str:
+    """Return why a winner does not fly: its fitness, a product, is zero in all fresh flights of a scenario; else ""."""
     n = len(study.scenarios)
     for place, label in enumerate(study.labels):
-        rows = [scores for (_, repeat), scores in flown.items() if repeat % n == place]
-        if found := dead_reason(study, rows):
-            return found if n == 1 else f"{label}: {found}"
+        sound = [scores for (_, repeat), scores in flown.items() if repeat % n == place and scores is not None]
+        if study.objectives[0].name != "fitness" or not sound or not _parts(sound):
+            continue
+        if max(float(row["fitness"]) for row in sound) < ZERO_FITNESS:
+            reason = f"no candidate flies, so there is no best one{zero_fitness_reason(sound)}"
+            return reason if n == 1 else f"{label}: {reason}"
     return ""
 
 
@@ -537,12 +521,14 @@ def select_finalists(
         best = best[np.argsort(losses[best, 0], kind="stable")]
         chosen = best[np.unique(np.linspace(0, len(best) - 1, min(top, len(best))).round().astype(int))]
     elif study.whole("pool") > top > 0:
-        chosen = race_candidates(evaluator, _points(store, known), losses[:, 0])
+        chosen = race_candidates(evaluator, _of_candidates(known, store.asked), losses[:, 0])
     else:
         chosen = np.arange(min(top, len(known)))
     if not len(chosen) and not centres:
         raise StudyError("search.top = 0 leaves no candidate to fly again; give at least 1")
-    return np.array([*centres, *_points(store, known.iloc[chosen])]), ["mean"] * len(centres) + ["top"] * len(chosen)
+    return np.array([*centres, *_of_candidates(known.iloc[chosen], store.asked)]), ["mean"] * len(centres) + [
+        "top"
+    ] * len(chosen)
 
 
 def fly_finalists(evaluator: Evaluator, points: NDArray[np.float64]) -> tuple[Sequence[Sequence[float | None]], int]:
@@ -623,26 +609,25 @@ def _winner(study: Study, rows: Sequence[Sequence[float | None]], excess: NDArra
     return int(np.argmin(np.where(sound, away.sum(axis=1), np.inf)))
 
 
-def _points(store: FlightStore, table: pd.DataFrame) -> NDArray[np.float64]:
-    """Return the points (candidate, axis) of candidates of the search from the store."""
-    pairs = {(int(run), int(g)) for run, g in zip(table["run"], table["generation"], strict=True)}
-    batches = {pair: store.asked(CandidateBatch("search", *pair)) for pair in pairs}
-    places = zip(table["run"], table["generation"], table["candidate"], strict=True)
-    return np.array([batches[run, generation][candidate] for run, generation, candidate in places])
+def _of_candidates(table: pd.DataFrame, read: Callable[[CandidateBatch], Sequence[Any]]) -> NDArray[np.float64]:
+    """Return what is read of the generations of the search, for each candidate of a table."""
+    known: dict[CandidateBatch, Sequence[Any]] = {}
+    found = []
+    for run, generation, candidate in zip(table["run"], table["generation"], table["candidate"], strict=True):
+        batch = CandidateBatch("search", int(run), int(generation))
+        if batch not in known:
+            known[batch] = read(batch)
+        found.append(known[batch][candidate])
+    return np.array(found)
 
 
 def candidate_excesses(study: Study, store: FlightStore, table: pd.DataFrame) -> NDArray[np.float64]:
     """Return how far each candidate of the search is from keeping all limits, in the order of the table."""
-    found: dict[tuple[int, int], NDArray[np.float64]] = {}
     durations = table[DURATION_COLUMN] if DURATION_COLUMN in table else pd.Series(np.nan, table.index)
-    for run, generation, flown in zip(table["run"], table["generation"], durations, strict=True):
-        if (run, generation) not in found:
-            share = 1.0 if np.isnan(flown) else float(flown) / study.scenario.flight.duration
-            found[run, generation] = batch_excess(
-                study, store, CandidateBatch("search", int(run), int(generation)), share
-            )
-    places = zip(table["run"], table["generation"], table["candidate"], strict=True)
-    return np.array([found[run, generation][candidate] for run, generation, candidate in places])
+    shares = (durations / study.scenario.flight.duration).fillna(1.0)
+    rows = reversed([*zip(table["run"], table["generation"], shares, strict=True)])  # the first of each counts
+    of_batch = {(run, generation): share for run, generation, share in rows}
+    return _of_candidates(table, lambda batch: batch_excess(study, store, batch, of_batch[batch[1:]]))
 
 
 NEIGHBOURS = 10
