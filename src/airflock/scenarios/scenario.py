@@ -225,7 +225,7 @@ class Scenario:
     @cached_property
     def law_indices(self) -> tuple[int, ...]:
         """Index in `laws` of each agent's law."""
-        return self._numbered([law.agents for law in self.laws])
+        return self._numbered([law.agents for law in self.laws[1:]], 1)
 
     def law_of(self, agent: int) -> FlownLaw:
         """Return the law that an agent flies by."""
@@ -236,10 +236,10 @@ class Scenario:
         """Number of each agent's group in [[groups]]; -1 where it is in none."""
         return self._numbered([group.agents for group in self.groups])
 
-    def _numbered(self, members: Sequence[Sequence[int]]) -> tuple[int, ...]:
-        """Return the number of the list that each agent is in; -1 where it is in none."""
-        indices = [-1] * self.agents
-        for number, agents in enumerate(members):
+    def _numbered(self, members: Sequence[Sequence[int]], first: int = 0) -> tuple[int, ...]:
+        """Return the number of the list that each agent is in, from `first` on; the one before where it is in none."""
+        indices = [first - 1] * self.agents
+        for number, agents in enumerate(members, first):
             for agent in agents:
                 indices[agent] = number
         return tuple(indices)
