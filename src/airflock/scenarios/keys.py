@@ -26,7 +26,7 @@ from airflock.parts import BODIES, FAULTS as KINDS, RADIOS, SENSORS, SETS, TOPOL
 from airflock.scenarios import formats
 from airflock.scenarios.fault_entries import FaultTiming
 from airflock.scenarios.groups import LETTERS
-from airflock.scenarios.named_code import MODELS, find_law
+from airflock.scenarios.named_code import MODELS
 from airflock.scenarios.part_kinds import PART_KINDS
 from airflock.scenarios.schema import LONG_FORM
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -95,11 +95,10 @@ class Section(NamedTuple):
 def sections() -> Mapping[str, Section]:
     """Return sections by name: the top, each model, body, sensor and radio, other sections, lists, kinds of fault."""
     result = {TOP: _section("at the top", "", Flight)}
-    for name in MODELS:
-        result[name] = _section(f'model.kind = "{name}"', "model", find_law(name).Parameters, name)
-    for family, members in (("body", BODIES), ("sensors", SENSORS)):
-        for name, member in members.items():
-            result[name] = _section(f'{family}.kind = "{name}"', family, member.Parameters, name)
+    apart: tuple[Kind[Any], ...] = (MODELS, BODIES, SENSORS)  # each member has a section of its own
+    for kind in apart:
+        for name, member in kind.items():
+            result[name] = _section(f'{kind.section}.kind = "{name}"', kind.section, member.Parameters, name)
     for name, record in SECTIONS.items():
         if name not in FAMILIES:
             result[name] = _section(f"[{name}]", name, record)
@@ -114,9 +113,9 @@ def sections() -> Mapping[str, Section]:
     result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
     shared = _section("[[faults]]", "faults", FaultTiming)
     result["faults"] = shared
-    for name, kind in KINDS.items():
-        about = kind.doc.strip().split("\n\n")[0].partition(": ")[2] or kind.doc
-        found = _section(f'[[faults]] kind = "{name}"', "faults", kind.Parameters, name)
+    for name, fault in KINDS.items():
+        about = fault.doc.strip().split("\n\n")[0].partition(": ")[2] or fault.doc
+        found = _section(f'[[faults]] kind = "{name}"', "faults", fault.Parameters, name)
         result[name] = found._replace(about=" ".join(f"{about[:1].upper()}{about[1:]}".split()))
     return result
 
