@@ -310,7 +310,7 @@ def vocabulary() -> None:
 def keys() -> None:
     """Every key of a scenario file, and the units that values may carry."""
     from airflock.scenarios.keys import sections
-    from airflock.scenarios.units import UNITS
+    from airflock.scenarios.schema import UNITS
 
     pieces = [
         "# Every key of a scenario file\n\n`airflock keys`, `airflock keys radio` and `airflock keys delay` print the "

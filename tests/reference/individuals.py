@@ -9,7 +9,7 @@ from airflock.core import random
 from airflock.core.contract import State, call_rule
 from airflock.core.parameters import Quantity, declarations
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.units import RelativeSpread
+from airflock.scenarios.schema import RelativeSpread
 
 
 @dataclass

@@ -15,9 +15,9 @@ from airflock.scenarios import groups, keys
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.named_code import MODELS, find_law
 from airflock.scenarios.scenario_builder import build_scenario
+from airflock.scenarios.schema import unit_names
 from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.settings import TOP_LEVEL_KEYS
-from airflock.scenarios.units import unit_names
 from airflock.support.errors import ScenarioError
 
 NAME = "vasarhelyi_2018/real_6ms"

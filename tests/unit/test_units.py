@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.scenarios.units import SPELLINGS, UNITS, conversion_factor
+from airflock.scenarios.schema import SPELLINGS, UNITS, conversion_factor
 from airflock.support.errors import ScenarioError
 
 NAME = "vasarhelyi_2018/4ms"

@@ -16,7 +16,7 @@ from airflock.parts.steering import law_for_command
 from airflock.scenarios import schema
 from airflock.scenarios.named_code import find_law
 from airflock.scenarios.scenario_checks import body_errors, sensor_errors, silence_errors
-from airflock.scenarios.units import read_spread, standard_deviation
+from airflock.scenarios.schema import read_spread, standard_deviation
 from airflock.support import INVALID, ErrorCollector
 
 LETTERS = {

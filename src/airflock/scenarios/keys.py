@@ -28,9 +28,8 @@ from airflock.scenarios.fault_entries import FaultTiming
 from airflock.scenarios.groups import LETTERS
 from airflock.scenarios.named_code import MODELS
 from airflock.scenarios.part_kinds import PART_KINDS
-from airflock.scenarios.schema import LONG_FORM
+from airflock.scenarios.schema import LONG_FORM, unit_names
 from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.scenarios.units import unit_names
 from airflock.support import ScenarioError, to_identifier
 
 TOP = "top"  # the keys before the first section
