@@ -19,19 +19,25 @@ from airflock.support.errors import ScenarioError
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 
+def recipe(scenario):
+    """Numbers of the optimum, and after all steps of Table S4."""
+    first = last = harden.optimum_parameters(scenario)
+    for step in harden.TABLE_S4_STEPS:
+        last = harden.parameters_after_step(scenario, last, step)
+    return first, last
+
+
 def test_recipe_moves_the_way_of_table_s4_and_stays_inside_ranges():
-    plans = harden.recipe_parameters(load("vasarhelyi_2018/6ms"))
-    first, last = plans[0][1], plans[-1][1]
-    assert first["model.p_rep"] == 0.07 and plans[0][0].name == "optimum"
+    first, last = recipe(load("vasarhelyi_2018/6ms"))
+    assert first["model.p_rep"] == 0.07
     assert last["model.p_rep"] == pytest.approx(0.105) and last["model.c_frict"] == pytest.approx(0.45)
     assert last["model.v_shill"] == pytest.approx(0.7 * 19.7) and last["model.r0_shill"] == pytest.approx(3.5)
-    tight = load("vasarhelyi_2018/6ms", {"model.p_rep": 9.0})
-    assert harden.recipe_parameters(tight)[-1][1]["model.p_rep"] == 10.0
+    assert recipe(load("vasarhelyi_2018/6ms", {"model.p_rep": 9.0}))[1]["model.p_rep"] == 10.0
 
 
 def test_models_without_these_parameters_are_refused():
     with pytest.raises(ScenarioError, match="zapotecatl_2016/best: no recipe for model reynolds_1987: model.c_frict"):
-        harden.recipe_parameters(load("zapotecatl_2016/best"))
+        harden.optimum_parameters(load("zapotecatl_2016/best"))
 
 
 def flown_by(monkeypatch, score):

@@ -376,7 +376,9 @@ def _start(law: TestedLaw, seed: int) -> Array:
 
 def _time_step(law: TestedLaw, seed: int) -> str:
     """Positions at the end, without noise: the difference of two time steps shrinks when both are halved."""
-    quiet, start = _quiet(law.scenario), _start(law, seed)
+    noise = {"noise": 0.0} if hasattr(law.scenario.body, "noise") else {}
+    quiet = replace(law.scenario.without_sensor_errors, body=law.scenario.body.with_numbers(**noise))
+    start = _start(law, seed)
     ends = []
     for halvings in range(4):
         flight = replace(quiet.flight, dt=quiet.flight.dt / 2**halvings)
@@ -387,12 +389,6 @@ def _time_step(law: TestedLaw, seed: int) -> str:
     if errors[-1] <= max(0.5 * errors[0], 1e-9 * law.length):
         return ""
     return f"seed {seed}: positions change by {errors[0]:.2g}, then {errors[1]:.2g}, then {errors[2]:.2g} m"
-
-
-def _quiet(scenario: Scenario) -> Scenario:
-    """The scenario without noise."""
-    noise = {"noise": 0.0} if hasattr(scenario.body, "noise") else {}
-    return replace(scenario.without_sensor_errors, body=scenario.body.with_numbers(**noise))
 
 
 def _units_in_flight(law: TestedLaw, seed: int) -> str:

@@ -68,15 +68,6 @@ def law_from_caller(law: Any) -> Model:
 T = TypeVar("T")
 
 
-def load_user_module(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
-    """Import a Python file that a key names, beside the scenario file or in the current folder.
-
-    Raises what `import_user_file` raises.
-    """
-    beside = expand_path(name) if folder is None else folder / expand_path(name)
-    return import_user_file(beside if is_file(beside) else expand_path(name), f"{key} = {name!r}", trust=trust)
-
-
 def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     """Import a Python file that a scenario or study names.
 
@@ -125,7 +116,9 @@ def build_from_file(
 
     Raises what `import_user_file` and `make` raise.
     """
-    module = load_user_module(key, name, folder, trust=trust)
+    beside = expand_path(name) if folder is None else folder / expand_path(name)  # or in the current folder
+    path = beside if is_file(beside) else expand_path(name)
+    module = import_user_file(path, f"{key} = {name!r}", trust=trust)
     try:
         made = make(module, to_identifier(Path(name).stem))
         # A default outside its own range is found here, and not by the first flight that leaves the

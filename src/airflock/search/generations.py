@@ -415,7 +415,8 @@ def conclude_study(
     mean, sd, low, high = mean_interval(values)
     # The best value of the search is the luckiest, so the winner is scored on seeds that have
     # chosen nothing.
-    safe = _safe(study, sound)
+    # Working ranges are of those that keep all limits, if any of them does.
+    safe = sound[sound[EXCESS_COLUMN] == 0.0] if study.limits and (sound[EXCESS_COLUMN] == 0.0).any() else sound
     good = safe[safe[first.name] >= mean] if first.maximise else safe[safe[first.name] <= mean]
     result = EvolveResult(
         folder=folder,
@@ -455,13 +456,6 @@ def _sound_candidates(study: Study, store: FlightStore, table: pd.DataFrame, fol
     if not len(sound):
         reason = next(iter(store.reasons()), f"{first.name} is nan or inf, no finite number")
         raise StudyError(f"{folder}: every candidate failed; the first one: {reason}")
-    return sound
-
-
-def _safe(study: Study, sound: pd.DataFrame) -> pd.DataFrame:
-    """Return the candidates that keep all limits; all candidates if there are no limits or none keeps them."""
-    if study.limits and (sound[EXCESS_COLUMN] == 0.0).any():
-        return sound[sound[EXCESS_COLUMN] == 0.0]
     return sound
 
 

@@ -108,22 +108,14 @@ class StepResult:
         return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
 
 
-def recipe_parameters(
-    scenario: Scenario, steps: Sequence[HardeningStep] = TABLE_S4_STEPS
-) -> list[tuple[HardeningStep, dict[str, float]]]:
-    """Return the parameters after each step, the optimum first; values stay inside their declared ranges."""
+def optimum_parameters(scenario: Scenario, steps: Sequence[HardeningStep] = TABLE_S4_STEPS) -> dict[str, float]:
+    """Return the numbers that the steps change, where hardening begins; refuse a model that lacks one."""
     known = declared_numbers(scenario)
     keys = {key for step in (*steps, *TABLE_S4_STEPS) for key in step.factors} | {"model.r0_shill"}
-    missing = sorted(key for key in keys if key not in known)
-    if missing:
+    if missing := sorted(key for key in keys if key not in known):
         where = f"{scenario.name}: no recipe for model {scenario.model.name}"
         raise ScenarioError([f"{where}: {key} is not a number of it" for key in missing])
-    now = {key: float(known[key][1] or 0.0) for key in sorted(keys)}
-    found = [(HardeningStep("optimum", {}, "where hardening begins"), dict(now))]
-    for step in steps:
-        now = parameters_after_step(scenario, now, step)
-        found.append((step, now))
-    return found
+    return {key: float(known[key][1] or 0.0) for key in sorted(keys)}
 
 
 def parameters_after_step(
@@ -552,7 +544,7 @@ def harden(
     single = isinstance(scenario, (Scenario, str, os.PathLike))
     scenarios = [load_if_named(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
     work = Hardening(scenarios, check_seeds(seeds), steps, hardening_request(scenarios, cost, limit))
-    optimum = recipe_parameters(scenarios[0], steps)[0]
+    optimum = HardeningStep("optimum", {}, "where hardening begins"), optimum_parameters(scenarios[0], steps)
     with run_folder(folder) as path:
         open_folder(path, work)
         executor = make_executor([ScenarioTask(each) for each in scenarios], threads=threads)

@@ -390,7 +390,12 @@ def search_errors(
             f"search.algorithm = '{search.algorithm}' takes one objective, but there are {len(objectives)}; "
             f"give one, or search.algorithm = '{MULTI_OBJECTIVE}'"
         )
-    errors += _only_cmaes(search)
+    for name in ("flights", "start", "spread", "averages", "windows") if search.algorithm != "cmaes" else ():
+        if (value := getattr(search, name)) != getattr(SearchSettings(), name):
+            shown = repr(value) if isinstance(value, str) else f"{value:g}"
+            errors.append(
+                f"search.{name} = {shown} is for algorithm cmaes, but search.algorithm = '{search.algorithm}'"
+            )
     if search.again and (limits or len(objectives) > 1):
         errors.append("search.again compares one fitness; leave it at 0 with limits or several objectives")
     if search.flights == "growing":
@@ -410,19 +415,6 @@ def search_errors(
     if flights >= 2 ** (SEED_BITS - 4):
         errors.append(f"search: {flights:g} flights are more than a study can number")
     return errors
-
-
-def _only_cmaes(search: SearchSettings) -> list[str]:
-    """Faults of keys that mean something for CMA-ES alone, where another algorithm searches."""
-    if search.algorithm == "cmaes":
-        return []
-    usual, found = SearchSettings(), []
-    for name in ("flights", "start", "spread", "averages", "windows"):
-        value = getattr(search, name)
-        if value != getattr(usual, name):
-            shown = repr(value) if isinstance(value, str) else f"{value:g}"
-            found.append(f"search.{name} = {shown} is for algorithm cmaes, but search.algorithm = '{search.algorithm}'")
-    return found
 
 
 KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
@@ -952,7 +944,8 @@ def default_space(scenario: Scenario) -> tuple[SearchSpace, list[str]]:
         notes = [f"bounds of the study {name}{scaled}"]
     if dead:
         notes.append(f"not searched, because nothing reads them here: {', '.join(sorted(dead))}")
-    return SearchSpace(tuple(_ordered(axes))), notes
+    keys = {axis.key for axis in axes}  # an order above a number that is not searched no longer holds
+    return SearchSpace(tuple(a if a.above in keys or not a.above else replace(a, above="") for a in axes)), notes
 
 
 def shipped_study_axes(scenario: Scenario) -> dict[str, tuple[float, float]]:
@@ -1034,9 +1027,3 @@ def _typical(scenario: Scenario, how: Quantity) -> float:
         "m": 0.25 * (largest_extension(scenario.world) or scenario.radio.range), "m/s": _speed(scenario),
     }  # fmt: skip
     return min(float(sizes.get(how.unit) or 1.0), how.high - how.low)
-
-
-def _ordered(axes: list[SearchAxis]) -> list[SearchAxis]:
-    """Axes without an order that no longer holds: above a number that is not searched."""
-    keys = {axis.key for axis in axes}
-    return [axis if axis.above in keys or not axis.above else replace(axis, above="") for axis in axes]

@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -253,21 +254,13 @@ def export(store: FlightStore, folder: Path, scenarios: Sequence[str] = ()) -> l
     written = [folder / "evaluations.csv"]
     try:
         atomic.write_file(written[0], table.to_csv(index=False))
-        if _has_parquet():
+        if find_spec("pyarrow"):
             written.append(folder / "evaluations.parquet")
             with atomic.atomic_path(written[1]) as temporary:
                 table.to_parquet(temporary, index=False)
     except OSError as error:
         raise StudyError(f"{folder}: tables cannot be written: {error.strerror or error}") from error
     return written
-
-
-def _has_parquet() -> bool:
-    try:
-        import pyarrow  # noqa: F401
-    except ModuleNotFoundError:
-        return False
-    return True
 
 
 def sort_by_fitness(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
