@@ -48,11 +48,6 @@ class Truth:
     mismatch: str = ""
     reason: str = ""
 
-    @property
-    def is_broken(self) -> bool:
-        """Return True if the truth is broken without being declared in VIOLATES."""
-        return bool(self.mismatch) and not self.reason
-
     def __str__(self) -> str:
         """One line for a person."""
         if not self.mismatch:
@@ -225,7 +220,7 @@ class Trials:
         if unknown := sorted(set(violates) - set(table)):
             raise RuleError(f"{name}: VIOLATES names {', '.join(unknown)}; known: {', '.join(table)}")
         made = tuple(Truth(key, says, _mismatch(check), violates.get(key, "")) for key, (says, check) in table.items())
-        if broken := [f"{name}: {truth}" for truth in made if truth.is_broken]:
+        if broken := [f"{name}: {truth}" for truth in made if truth.mismatch and not truth.reason]:
             raise CheckError("\n".join(broken))
         return Report(name, made)
 

@@ -603,9 +603,9 @@ def _winner(study: Study, rows: Sequence[Sequence[float | None]], excess: NDArra
     return int(np.argmin(np.where(sound, away.sum(axis=1), np.inf)))
 
 
-def _of_candidates(table: pd.DataFrame, read: Callable[[CandidateBatch], Sequence[Any]]) -> NDArray[np.float64]:
+def _of_candidates(table: pd.DataFrame, read: Callable[[CandidateBatch], Any]) -> NDArray[np.float64]:
     """Return what is read of the generations of the search, for each candidate of a table."""
-    known: dict[CandidateBatch, Sequence[Any]] = {}
+    known: dict[CandidateBatch, Any] = {}
     found = []
     for run, generation, candidate in zip(table["run"], table["generation"], table["candidate"], strict=True):
         batch = CandidateBatch("search", int(run), int(generation))
