@@ -511,7 +511,8 @@ class Study:
             **({"limits": [limit.text for limit in self.limits]} if self.limits else {}),
             "space": self.space.document(),
             "scenario": unpublished(self.scenario),
-            **self._several(),
+            **({"over_scenarios": self.over_scenarios, "labels": list(self.labels)} if self.others else {}),
+            **{f"scenario_{i}": unpublished(scenario) for i, scenario in enumerate(self.others, 2)},
         }
 
     @property
@@ -525,13 +526,6 @@ class Study:
         sections = ["", *dict.fromkeys(section for section, _, _ in keys)]
         in_order = sorted(keys, key=lambda key: sections.index(key[0])) == keys
         return found if in_order else found | {"order": list(self.space.keys)}
-
-    def _several(self) -> dict[str, Any]:
-        """Return the entries of several scenarios for the document."""
-        if not self.others:
-            return {}
-        found = {f"scenario_{i}": unpublished(scenario) for i, scenario in enumerate(self.others, 2)}
-        return {"over_scenarios": self.over_scenarios, "labels": list(self.labels), **found}
 
 
 def shipped_studies() -> dict[str, Path]:

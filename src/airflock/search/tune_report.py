@@ -248,6 +248,11 @@ ALWAYS = ("sensors.period", "radio.delay", "body.delay")  # a driver reads them 
 
 def document_rows(scenario: Scenario, searched: Collection[str]) -> list[ReportRow]:
     """Return key, value and source of all entries of the scenario's file except the searched numbers."""
+    units = {
+        f"{section}.{name}".lstrip("."): str(getattr(how, "unit", ""))
+        for section, record in scenario.records.items()
+        for name, how, _ in declarations(record)
+    }
     rows = []
     for section, table in scenario.document.items():
         if section in LEFT_OUT:
@@ -256,7 +261,7 @@ def document_rows(scenario: Scenario, searched: Collection[str]) -> list[ReportR
         for name, entry in (("", table),) if single else table.items():
             key = f"{section}.{name}".rstrip(".")
             if key not in searched:
-                rows.append(_row(key, entry, _unit(scenario, section, name)))
+                rows.append(_row(key, entry, units.get(key, "")))
     return rows
 
 
@@ -268,15 +273,6 @@ def _row(key: str, entry: Any, unit: str) -> ReportRow:
     text = str(entry)
     text = text if len(text) < 80 else f"{text[:77]}..."
     return key, text if isinstance(entry, str) else format_with_unit(text, unit), source
-
-
-def _unit(scenario: Scenario, section: str, name: str) -> str:
-    """Return the unit of a key as its record declares it; empty if it is no number."""
-    record = scenario.records.get(section) if name else scenario.flight
-    if not hasattr(record, "__dataclass_fields__"):
-        return ""
-    units = {key: str(getattr(how, "unit", "")) for key, how, _ in declarations(record)}
-    return units.get(name or section, "")
 
 
 def default_rows(scenario: Scenario) -> list[ReportRow]:
