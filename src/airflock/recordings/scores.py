@@ -110,8 +110,8 @@ def score(
         names = ", ".join(name for name, given in recording_options.items() if given)
         raise RecordingError(f"{names}: needs a recording, such as one from airflock.simulate(scenario)")
     scenario, numbers = scenario_variant(scenario_or_recording, settings, trust=trust), check_seeds(seeds)
-    options = {"threads": threads, "precision": precision, "on_done": done, "device": device, "notify": say}
-    rows = score_scenarios([scenario] * len(numbers), numbers, scheduler=scheduler, **options)
+    how: dict[str, Any] = {"threads": threads, "precision": precision, "on_done": done, "device": device, "notify": say}
+    rows = score_scenarios([scenario] * len(numbers), numbers, scheduler=scheduler, **how)
     return _about(pd.DataFrame(rows, index=pd.Index(numbers, name="seed")), scenario)
 
 

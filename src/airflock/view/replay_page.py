@@ -178,7 +178,7 @@ def _variable_layers(recording: xr.Dataset, stride: int) -> Iterator[ColourLayer
             continue
         plain = variable.isel(keypoint=0) if "keypoint" in variable.dims else variable
         if name == "command" and "space" in plain.dims:
-            plain = np.sqrt((plain**2).sum("space", skipna=False))
+            plain = (plain**2).sum("space", skipna=False) ** 0.5
         if set(plain.dims) <= {"time", "individual"}:
             values = plain.broadcast_like(recording["time"]).transpose("time", "individual").values.astype(float)
             unit = str(variable.attrs.get("units", ""))
@@ -343,7 +343,7 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
     known = pd.DataFrame(np.where(present[:, None], frames, np.nan).reshape(len(frames), -1)).ffill().bfill()
     kept, ever = known.to_numpy().reshape(frames.shape).copy(), present.any(axis=0)
     kept[:, :, ~ever] = kept[:, :, [int(ever.argmax())]]
-    return kept
+    return np.asarray(kept)
 
 
 def _charts(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:

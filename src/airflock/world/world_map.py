@@ -300,7 +300,7 @@ class WorldMap:
         """Return True if an obstacle or the scene stands between two positions, m; walls of an arena do not hide."""
         dx, dy, dz = to_x - x, to_y - y, to_z - z
         length = norm(dx, dy, dz)
-        return self._free_of_solids(x, y, z, dx / length, dy / length, dz / length, length) < length
+        return bool(self._free_of_solids(x, y, z, dx / length, dy / length, dz / length, length) < length)
 
     def _free_of_solids(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, free: float) -> float:
         """Return how far a thin ray that is free so far (m) goes before it meets an obstacle or the scene, m."""

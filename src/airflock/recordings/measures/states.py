@@ -49,8 +49,8 @@ def track_arrays(recording: xr.Dataset) -> TrackArrays:
         raise RecordingError(f"recording: has {len(names)} keypoints; choose one of {', '.join(names)}")
     time, position, known = dataset.motion_arrays(recording, float)
     velocity = np.full_like(position, np.nan) if known is None else known
-    placed = np.isfinite(position).all(axis=1)
-    present = placed & np.isfinite(velocity).all(axis=1)
+    placed = np.asarray(np.isfinite(position).all(axis=1))
+    present = np.asarray(placed & np.isfinite(velocity).all(axis=1))
     nowhere, unknown = ~placed[:, None, :], ~present[:, None, :]
     individuals = [str(name) for name in recording["individual"].values]
     position, velocity = np.where(nowhere, np.nan, position), np.where(unknown, np.nan, velocity)
