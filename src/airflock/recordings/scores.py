@@ -102,9 +102,16 @@ def score(
     ([0, 1, 2], 'm/s')
     """
     if isinstance(scenario_or_recording, xr.Dataset):
-        return _of_recording(
-            scenario_or_recording, settings, aero=aero, groups=groups, body_length=body_length, trust=trust
-        )
+        recording, given = scenario_or_recording, settings_dict(settings, "recording")
+        # Explicit settings have priority over what follows from the length of a body.
+        given = body_length_settings(body_length) | given if body_length is not None else given
+        given = power_settings(recording, given) if aero else given
+        scenario = scenario_of_recording(recording, given, trust=trust)
+        if groups:
+            return _about(group_scores(recording, given, trust=trust), scenario)
+        table = _about(pd.DataFrame([measure_recording(recording, given, trust=trust)[0]]), scenario)
+        table.attrs["not_told"] = undefined_metrics_of(recording, scenario, given)
+        return table
     recording_options = {"aero": aero, "groups": groups, "body_length": body_length is not None}
     if any(recording_options.values()):
         names = ", ".join(name for name, given in recording_options.items() if given)
@@ -113,28 +120,6 @@ def score(
     how: dict[str, Any] = {"threads": threads, "precision": precision, "on_done": done, "device": device, "notify": say}
     rows = score_scenarios([scenario] * len(numbers), numbers, scheduler=scheduler, **how)
     return _about(pd.DataFrame(rows, index=pd.Index(numbers, name="seed")), scenario)
-
-
-def _of_recording(
-    recording: xr.Dataset,
-    given: Mapping[str, Any] | None,
-    *,
-    aero: bool,
-    groups: bool,
-    body_length: float | None,
-    trust: bool,
-) -> pd.DataFrame:
-    """Return the table of a recording."""
-    settings = settings_dict(given, "recording")
-    # Explicit settings have priority over what follows from the length of a body.
-    settings = body_length_settings(body_length) | settings if body_length is not None else settings
-    settings = power_settings(recording, settings) if aero else settings
-    scenario = scenario_of_recording(recording, settings, trust=trust)
-    if groups:
-        return _about(group_scores(recording, settings, trust=trust), scenario)
-    table = _about(pd.DataFrame([measure_recording(recording, settings, trust=trust)[0]]), scenario)
-    table.attrs["not_told"] = undefined_metrics_of(recording, scenario, settings)
-    return table
 
 
 def undefined_metrics_of(

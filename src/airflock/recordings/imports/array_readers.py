@@ -69,7 +69,8 @@ def read_array(
         scale = table_columns.unit_in_metres("", where, "array", options)
     if errors or rate is None:
         raise RecordingError("\n".join(errors))
-    names = names or [str(number + 1) for number in range(values.shape[1])]
+    if not names or len(names) != values.shape[1]:
+        names = [str(number + 1) for number in range(values.shape[1])]
     return _tracks(where, names, np.arange(len(values)) / rate, {"position": (values, scale)})
 
 
@@ -222,8 +223,8 @@ def _read_sleap(file: xr.Dataset, path: Path, options: ImportOptions) -> list[Im
     keypoints = _texts(file["node_names"].values)
     number = keypoints.index(choose_keypoint(keypoints, options, str(path)))
     values = file["tracks"].values[:, :, number].transpose(2, 0, 1)
-    given = _texts(file["track_names"].values) if "track_names" in file else []
-    return read_array(values, options, str(path), given if len(given) == values.shape[1] else None)
+    names = _texts(file["track_names"].values) if "track_names" in file else None
+    return read_array(values, options, str(path), names)
 
 
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
@@ -249,16 +250,12 @@ def read_hdf5(path: Path, options: ImportOptions, findings: ImportReport) -> lis
         return read_members(arrays, path, options, findings)
     values = file["trajectories"].values
     entries = {**{str(k): v.values[()] for k, v in file.variables.items() if v.shape == ()}, **file.attrs}
-    if "identities_labels" in file:
-        entries["identities_labels"] = file["identities_labels"].values
     fps = float(entries["frames_per_second"]) if "frames_per_second" in entries else None
     body = entries.get("body_length")
     if body is not None and np.ndim(body) == 0:
         findings.notes.append(f"{path}: idtracker.ai gives a body length of {float(body):g} px")
-    labels = entries.get("identities_labels")
-    given = [] if labels is None else _texts(labels)
-    names = given if len(given) == values.shape[1] else None
-    return read_array(values, options, str(path), names, fps, findings)
+    labels = file["identities_labels"].values if "identities_labels" in file else entries.get("identities_labels")
+    return read_array(values, options, str(path), None if labels is None else _texts(labels), fps, findings)
 
 
 @reader("netCDF of movement", suffixes=(".nc",))

@@ -1,7 +1,8 @@
 """Meshes of the user's: read by trimesh, checked, turned upright, as rows of triangles. A mesh file is untrusted."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +17,30 @@ from airflock.world.shapes import CLOSED
 STRIP = 5  # glTF: from this mode on every corner may begin a triangle; before, three corners make one
 
 
+@contextmanager
+def _damaged(path: Path) -> Iterator[None]:
+    """Turn whatever a parser raises into a SceneError."""
+    try:
+        yield
+    except SceneError:
+        raise
+    except Exception as fault:
+        raise SceneError(f"scene.file = {path}: cannot be read, it is damaged or cut short: {fault}") from fault
+
+
+def _refuse_many(path: Path, count: int, most: int) -> None:
+    if count > most:
+        raise SceneError(f"scene.file = {path}: {count} triangles are more than {most}; simplify the mesh")
+
+
 def check_header(path: Path, kind: str, size: int, max_triangles: int) -> None:
     """Raise SceneError for a file of `size` bytes that is cut short or has more than `max_triangles` triangles."""
     if kind == "stl":
         _stl(path, size)
     elif kind in ("gltf", "glb"):
-        try:
+        with _damaged(path):  # any part of the document may be missing or of another kind
             count = _triangles(_glb(path, size) if kind == "glb" else json.loads(path.read_bytes()))
-        except SceneError:
-            raise
-        except Exception as fault:  # any part of the document may be missing or of another kind
-            raise SceneError(f"scene.file = {path}: cannot be read, it is damaged or cut short: {fault}") from fault
-        if count > max_triangles:
-            raise SceneError(f"scene.file = {path}: {count} triangles are more than {max_triangles}; simplify the mesh")
+        _refuse_many(path, count, max_triangles)
 
 
 def _stl(path: Path, size: int) -> None:
@@ -175,17 +187,12 @@ def read_mesh(path: Path) -> Any:
         )
     # Before trimesh opens it: a small file that places one mesh many times expands to all of them.
     check_header(path, kind, size, MOST_TRIANGLES)
-    try:
+    with _damaged(path):  # any parser may fail in any way on a damaged file
         mesh: Any = trimesh.load(path, force="mesh", process=True, skip_materials=True)
         faces, corners = np.asarray(mesh.faces), np.asarray(mesh.vertices, float)
-    except Exception as fault:  # any parser may fail in any way on a damaged file
-        raise SceneError(f"scene.file = {path}: cannot be read, it is damaged or cut short: {fault}") from fault
     if not len(faces):
         raise SceneError(f"scene.file = {path}: no triangles in it; it is empty, damaged or cut short")
-    if len(faces) > MOST_TRIANGLES:
-        raise SceneError(
-            f"scene.file = {path}: {len(faces)} triangles are more than {MOST_TRIANGLES}; simplify the mesh"
-        )
+    _refuse_many(path, len(faces), MOST_TRIANGLES)
     if not np.isfinite(corners).all() or faces.max() >= len(corners):
         raise SceneError(
             f"scene.file = {path}: some corners are missing or not numbers; the file is damaged or cut short"

@@ -354,12 +354,9 @@ def scene_of(
 
         rows, notes = load_mesh(p, dimensions)
     elif p.kind == "boxes":
-        given = np.array(p.boxes, float).reshape(-1, 7)
-        rows = box_rows(given[:, :6])
-        rows[:, APPEARS] = given[:, 6]
-        balls = np.array(p.spheres, float).reshape(-1, 5)
-        rows = np.concatenate([rows, sphere_rows(balls[:, :4])])
-        rows[len(given) :, APPEARS] = balls[:, 4]
+        boxes, balls = np.array(p.boxes, float).reshape(-1, 7), np.array(p.spheres, float).reshape(-1, 5)
+        rows = np.concatenate([box_rows(boxes[:, :6]), sphere_rows(balls[:, :4])])
+        rows[:, APPEARS] = np.concatenate([boxes[:, 6], balls[:, 4]])
     else:
         rows = buildings(p) if p.kind == "city" else trees(p)
         rows[:, APPEARS] = appearance_times(p, len(rows))
