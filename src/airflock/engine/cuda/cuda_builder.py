@@ -32,10 +32,8 @@ from airflock.engine.stages.words import (
     HALF,
     REDUCTION_START,
     ZERO,
-    X,
-    Y,
-    Z,
     call_rule,
+    components,
     real,
     reduce_term,
     totals,
@@ -190,7 +188,7 @@ def grown(mine: Any, size: Any, mean: Any, flight: FlightView, n: int, *, metric
                 k[c] = reduce_term(way, k[c], t[c] if mine[i] > HALF else REDUCTION_START[way])
     members = record_of_totals(metric.Member, k) if metric.member is not None else None
     return call_rule(
-        metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members, mean=own_mean,
+        metric.cluster, n=real(size), **components("h", s), hh=hh, members=members, mean=own_mean,
         q=flight.numbers.q,
     )  # fmt: skip
 

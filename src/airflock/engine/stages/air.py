@@ -8,7 +8,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.meet import free_distance
 from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.state import FlockRows
-from airflock.engine.stages.words import HALF_SIZES, ONE, TINY, ZERO, X, Y, Z, choose, integer, least, vector
+from airflock.engine.stages.words import *
 from airflock.world import nearest_image
 
 

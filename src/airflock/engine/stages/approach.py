@@ -12,7 +12,7 @@ from typing import Any
 from airflock.engine.plan import Plan
 from airflock.engine.stages.measure import offset
 from airflock.engine.stages.state import FlockRows
-from airflock.engine.stages.words import FAR, ONE, ZERO, choose, integer, lanes_between, least, most, real, vector
+from airflock.engine.stages.words import *
 
 # places in `held` (`passes.driver.flight` says what each is); DRIFT is the first of three
 TRAVELLED, GAP, CALM, ENDED, BEGUN, DRIFT, PACE, REACH = 0, 1, 2, 3, 4, 5, 8, 9

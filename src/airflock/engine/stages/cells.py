@@ -12,26 +12,7 @@ import numpy as np
 from airflock.engine.plan import Plan
 from airflock.engine.stages.records import FlightView, SortedCells
 from airflock.engine.stages.state import FlockRows
-from airflock.engine.stages.words import (
-    AWAY,
-    BLOCK,
-    FAR,
-    HALF_SIZES,
-    ONE,
-    REDUCTION_START,
-    ZERO,
-    X,
-    Y,
-    Z,
-    copy_block,
-    integer,
-    least,
-    most,
-    parallel,
-    real,
-    repeat,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import *
 
 # A dispersed flock must not fill the memory with empty cells: at most four cells per agent, then
 # cells grow.

@@ -20,19 +20,7 @@ from airflock.engine.stages.measure import (
     shared_record,
 )
 from airflock.engine.stages.records import FlightView
-from airflock.engine.stages.words import (
-    ONE,
-    ZERO,
-    X,
-    Y,
-    Z,
-    call_rule,
-    integer,
-    real,
-    rule_asks,
-    totals,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import *
 
 
 def expand_agent(e: int, state: Any, expanded: Any, flight: FlightView, n: int, *, metric: Metric) -> Any:
@@ -180,7 +168,7 @@ def sum_clusters(metric: Metric, mean: Any, flight: FlightView, n: int, m: int, 
                     state[j] = integer(2) if state[j] != 0 else integer(0)
             done += size
             t = call_rule(
-                metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members,
+                metric.cluster, n=real(size), **components("h", s), hh=hh, members=members,
                 mean=own_mean, q=flight.numbers.q,
             )  # fmt: skip
             add_terms(u, t, metric.Cluster, metric)

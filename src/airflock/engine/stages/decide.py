@@ -9,7 +9,7 @@ from airflock.core import Model, Own, norm
 from airflock.engine.plan import Plan
 from airflock.engine.stages.records import WorldArrays
 from airflock.engine.stages.state import Columns, FlockRows, agent_numbers, record_from_table, scene_tree
-from airflock.engine.stages.words import ONE, ZERO, X, Y, Z, call_rule, field_indices, real, rule_asks, vector
+from airflock.engine.stages.words import *
 from airflock.world import bvh
 
 MAX_GATHERED = 64  # shapes gathered at most; where more are in sight, each cast goes through the tree
@@ -114,7 +114,7 @@ def decide(
         )  # fmt: skip
         if model.steer is not None:  # the body takes another kind of command than the law gives
             steered = call_rule(
-                model.steer, cx=o[X], cy=o[Y], cz=o[Z], own=own, period=numbers.c.period, steer=numbers.steer
+                model.steer, **components("c", o), own=own, period=numbers.c.period, steer=numbers.steer
             )
             for a in axes:
                 flock.command[a][i] = steered[a]

@@ -10,7 +10,7 @@ from typing import Any
 from airflock.core import DISTURBED_STATES, Fault
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Axes, FlockRows, followed_command
-from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, call_rule, choose, least, most, real
+from airflock.engine.stages.words import *
 
 
 def has_fault(i: int, kind: Fault, time: Any, flock: FlockRows, numbers: Any) -> Any:
@@ -90,12 +90,8 @@ def apply_state_faults(
                 )
         t = call_rule(
             kind.rules[DISTURBED_STATES[state]],
-            x=position[X][i],
-            y=position[Y][i],
-            z=position[Z][i],
-            vx=velocity[X][i],
-            vy=velocity[Y][i],
-            vz=velocity[Z][i],
+            **row_components("", position, i),
+            **row_components("v", velocity, i),
             **fault_arguments(i, kind, time, flock, plan=plan),
             **{
                 name: flock.kept(kind.name, state, name)[i] if name[-1] in plan.axes else ZERO
@@ -152,7 +148,7 @@ def overrule(agents: Iterable[int], flock: FlockRows, numbers: Any, time: float,
     for i in agents:
         for kind in plan.suffers("overrule"):
             t = call_rule(
-                kind.overrule, cx=c[X][i], cy=c[Y][i], cz=c[Z][i], **fault_arguments(i, kind, time, flock, plan=plan)
+                kind.overrule, **row_components("c", c, i), **fault_arguments(i, kind, time, flock, plan=plan)
             )
             on = has_fault(i, kind, time, flock, numbers)
             for a in range(plan.dimensions):
@@ -165,7 +161,6 @@ def apply_motion_fault(
     """Return the velocity after a motion step as the rule `motion` of a kind of fault changes it, m/s."""
     before, command = flock.before_step, followed_command(flock, plan=plan)
     return call_rule(
-        kind.motion, vx=before[X][i], vy=before[Y][i], vz=before[Z][i],
-        cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
-        nx=moved[X], ny=moved[Y], nz=moved[Z], dt=numbers.c.dt, **fault_arguments(i, kind, time, flock, plan=plan),
+        kind.motion, **row_components("v", before, i), **row_components("c", command, i), **components("n", moved),
+        dt=numbers.c.dt, **fault_arguments(i, kind, time, flock, plan=plan),
     )  # fmt: skip

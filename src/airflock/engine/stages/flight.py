@@ -9,7 +9,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import BEGUN, CALM, ENDED, GAP, SLACK, TRAVELLED, approach_bound, start_drift
 from airflock.engine.stages.measure import MeasuredMetric
 from airflock.engine.stages.state import FlockRows
-from airflock.engine.stages.words import HALF, ONE, ZERO, call_rule, most, real, row_index
+from airflock.engine.stages.words import *
 
 Stages = Mapping[str, Callable[..., Any]]  # by name, called with their arguments by name
 Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)

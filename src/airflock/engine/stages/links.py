@@ -13,7 +13,7 @@ from airflock.engine.stages.clusters import call_member, mean_from_sums
 from airflock.engine.stages.measure import add_terms, clear_totals, record_of_totals
 from airflock.engine.stages.near import apart, cell_position, wrap_cell
 from airflock.engine.stages.records import FlightView, GrowingClusters, SortedCells
-from airflock.engine.stages.words import ZERO, X, Y, Z, call_rule, real, totals, vector
+from airflock.engine.stages.words import *
 
 
 def join_cell(
@@ -145,7 +145,7 @@ def clusters_by_cells(
             own_mean = mean_from_sums(tail - done, s, v, h, mean, plan=flight.plan, metric=metric)
             members = sum_members(done, tail, own_mean, flight, cells.whose, reached, metric=metric)
             t = call_rule(
-                metric.cluster, n=real(tail - done), hx=h[X], hy=h[Y], hz=h[Z], hh=hh, members=members, mean=own_mean,
+                metric.cluster, n=real(tail - done), **components("h", h), hh=hh, members=members, mean=own_mean,
                 q=flight.numbers.q,
             )  # fmt: skip
             add_terms(u, t, metric.Cluster, metric)

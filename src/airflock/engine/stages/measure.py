@@ -9,27 +9,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.scene import find_contacts
 from airflock.engine.stages.state import Axes, FlockRows, record_from_table
-from airflock.engine.stages.words import (
-    FAR,
-    HALF_SIZES,
-    ONE,
-    REDUCTION_START,
-    TINY,
-    ZERO,
-    X,
-    Y,
-    Z,
-    call_rule,
-    choose,
-    field_indices,
-    integer,
-    least,
-    real,
-    reduce_term,
-    rule_asks,
-    totals,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import *
 from airflock.world import nearest_image
 
 
@@ -200,7 +180,7 @@ def sum_pairs_of(
             ok = (integer(j) != integer(e)) & (integer(j) < nn)
             for metric, _, _, first in paired:
                 t = call_rule(
-                    metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
+                    metric.pair, **components("d", d), r=r, r2=r2, q=numbers.q,
                     lower=(ONE if integer(j) < integer(e) else ZERO),
                 )  # fmt: skip
                 for c, way in enumerate(reductions(metric.Pair, metric)):
@@ -217,10 +197,11 @@ def sum_pairs_of(
 def agent_arguments(i: int, flock: FlockRows) -> Any:
     """Of agent i what every rule may ask for: position, velocity, heading and speed."""
     return {
-        "x": flock.position[X][i], "y": flock.position[Y][i], "z": flock.position[Z][i], "speed": flock.speed[i],
-        "vx": flock.velocity[X][i], "vy": flock.velocity[Y][i], "vz": flock.velocity[Z][i],
-        "hx": flock.heading[X][i], "hy": flock.heading[Y][i], "hz": flock.heading[Z][i],
-    }  # fmt: skip
+        **row_components("", flock.position, i),
+        **row_components("v", flock.velocity, i),
+        **row_components("h", flock.heading, i),
+        "speed": flock.speed[i],
+    }
 
 
 def call_agent_rule(i: int, pair: Any, shared: Any, kept: Any, mean: Any, flight: FlightView, *, metric: Metric) -> Any:

@@ -9,7 +9,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.percept import ray_to_obstacle
 from airflock.engine.stages.records import CandidateRows, FlightView
 from airflock.engine.stages.state import FlockRows, all_agents, scene_tree
-from airflock.engine.stages.words import FAR, HALF, ONE, ZERO, X, Y, Z, call_rule, least
+from airflock.engine.stages.words import *
 from airflock.world import bvh
 
 FADE = random.FADE
@@ -76,7 +76,7 @@ def call_topology(n: int, others: CandidateRows, flight: FlightView) -> None:
     # The k-th least distance is a limit, and an agent exactly on it is met, too: no number of an
     # agent decides, and a flock that is its own mirror image stays so.
     call_rule(
-        flight.plan.meets, n=n, dx=others.away[X], dy=others.away[Y], dz=others.away[Z], r2=others.square,
+        flight.plan.meets, n=n, **components("d", others.away), r2=others.square,
         hidden=others.hidden, fade=others.fade, met=others.met, heap=others.heap, weak=others.weak,
         t=flight.numbers.topology,
     )  # fmt: skip

@@ -8,23 +8,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import velocity_beside_drift
 from airflock.engine.stages.faults import apply_motion_fault, has_fault
 from airflock.engine.stages.state import FlockRows, agent_numbers, followed_command, record_from_rows
-from airflock.engine.stages.words import (
-    HALF_SIZES,
-    ONE,
-    ZERO,
-    X,
-    Y,
-    Z,
-    aliases,
-    call_rule,
-    choose,
-    field_indices,
-    integer,
-    lanes_between,
-    most,
-    real,
-    rule_asks,
-)
+from airflock.engine.stages.words import *
 
 
 def first_command(flock: FlockRows, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
@@ -103,18 +87,12 @@ def apply_body(
     for i in lanes:
         t = call_rule(
             plan.body.move,
-            vx=v[X][i],
-            vy=v[Y][i],
-            vz=v[Z][i],
-            cx=command[X][i],
-            cy=command[Y][i],
-            cz=command[Z][i],
+            **row_components("v", v, i),
+            **row_components("c", command, i),
             mx=measured_velocity(i, X, flock, plan=plan),
             my=measured_velocity(i, Y, flock, plan=plan),
             mz=measured_velocity(i, Z, flock, plan=plan),
-            gx=g[X][i],
-            gy=g[Y][i],
-            gz=g[Z][i],
+            **row_components("g", g, i),
             wx=wx,
             wy=wy,
             wz=wz if plan.dimensions == 3 else ZERO,

@@ -12,28 +12,7 @@ import numpy as np
 from airflock.engine.plan import Plan
 from airflock.engine.stages.measure import MeasuredMetric, field_names, reductions
 from airflock.engine.stages.records import FlightView, HomeCell, SortedCells
-from airflock.engine.stages.words import (
-    FAR,
-    HALF_SIZES,
-    ONE,
-    REDUCTION_START,
-    TINY,
-    ZERO,
-    X,
-    Y,
-    Z,
-    call_rule,
-    choose,
-    field_indices,
-    integer,
-    least,
-    parallel,
-    real,
-    reduce_term,
-    repeat,
-    totals,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import *
 from airflock.world import nearest_image
 
 # Rounding may put an agent into the cell beside its own, so a ring is trusted only up to 0.999 of
@@ -84,7 +63,7 @@ def sum_run(
         ok = f != e
         for metric, _, _, start in paired:
             t = call_rule(
-                metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=flight.numbers.q,
+                metric.pair, **components("d", d), r=r, r2=r2, q=flight.numbers.q,
                 lower=(ONE if integer(flight.flock.number[cells.whose[f]]) < ii else ZERO),
             )  # fmt: skip
             for c, way in enumerate(reductions(metric.Pair, metric)):

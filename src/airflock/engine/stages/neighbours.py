@@ -10,23 +10,7 @@ from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, Sums, pair
 from airflock.engine.stages.receive import first_of_four, packet_count
 from airflock.engine.stages.records import Decision, FlightView, PairLoopAgent, SquaredRanges
 from airflock.engine.stages.state import FlockRows, agent_numbers, all_agents
-from airflock.engine.stages.words import (
-    LIMIT,
-    ONE,
-    REDUCTION_START,
-    TINY,
-    ZERO,
-    X,
-    Y,
-    Z,
-    call_rule,
-    integer,
-    least,
-    most,
-    real,
-    totals,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import *
 
 SMALLEST = 1e-3  # m; width of the cells of a law without agents
 

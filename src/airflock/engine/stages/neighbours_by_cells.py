@@ -33,25 +33,7 @@ from airflock.engine.stages.records import (
     SquaredRanges,
 )
 from airflock.engine.stages.state import FlockRows, agent_numbers
-from airflock.engine.stages.words import (
-    BLOCK,
-    LIMIT,
-    REDUCTION_START,
-    TINY,
-    ZERO,
-    ZERO_ROW,
-    X,
-    Y,
-    Z,
-    aliases,
-    call_rule,
-    integer,
-    least,
-    parallel,
-    rule_asks,
-    totals,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import *
 
 
 def make_line(oy: int, oz: int, flight: FlightView, work: Any, cells: SortedCells, ident: Any) -> Any:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Columns, FlockRows, Row
-from airflock.engine.stages.words import call_rule
+from airflock.engine.stages.words import *
 
 OUTER = random.OUTER
 

@@ -19,26 +19,7 @@ from airflock.engine.stages.receive import (
 )  # fmt: skip
 from airflock.engine.stages.records import CandidateRows, FlightView, NeighbourEstimate, PairLoopAgent
 from airflock.engine.stages.state import FlockRows
-from airflock.engine.stages.words import (
-    FAR,
-    GONE,
-    HALF,
-    HALF_SIZES,
-    ONE,
-    REDUCTION_START,
-    TINY,
-    ZERO,
-    X,
-    Y,
-    Z,
-    call_rule,
-    choose,
-    integer,
-    real,
-    reduce_term,
-    totals,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import *
 from airflock.world import nearest_image
 
 # Where a topology chooses, the pair loop runs twice: first to find the agents that are heard, then
@@ -153,8 +134,8 @@ def receive_packet(
         # the arguments of its rule.
         carried2 = squared_range(me.i, j, me.reach.radio, flock, plan=plan)
         known = {
-            "distance": math.sqrt(apart2 + TINY), "dx": o[X], "dy": o[Y], "dz": o[Z], "talkers": me.talkers,
-            "vx": flock.velocity[X][me.i], "vy": flock.velocity[Y][me.i], "vz": flock.velocity[Z][me.i],
+            "distance": math.sqrt(apart2 + TINY), **components("d", o), "talkers": me.talkers,
+            **row_components("v", flock.velocity, me.i),
             "clear": open_way, "step": real(at.step), "period": flight.numbers.c.period,
             "fast": at.fast, "slow": at.slow,
         }  # fmt: skip
@@ -182,11 +163,10 @@ def add_rule(
     me: PairLoopAgent, j: int, ok: Any, other: NeighbourEstimate, total: Any, flight: FlightView, *, sums: Sums
 ) -> None:
     """Add what the neighbour rule says of a pair to the totals, if the pair counts."""
-    d, dv, v, h, nh = other.d, other.dv, me.v, me.h, other.h
     plan, others = flight.plan, me.others
     t = call_rule(
-        flight.model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=other.r, r2=other.r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z],
-        dv=other.speed, vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
+        flight.model.neighbour, **components("d", other.d), r=other.r, r2=other.r2, **components("dv", other.dv),
+        dv=other.speed, **components("v", me.v), **components("h", me.h), **components("nh", other.h),
         age=other.age, lower=ONE if integer(others.number[j]) < me.number else ZERO,
         kin=same_group(me.i, j, flight.flock, others, plan=plan), group=group_of(j, others, plan=plan), p=me.p,
     )  # fmt: skip

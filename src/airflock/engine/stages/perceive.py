@@ -12,7 +12,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
 from airflock.engine.stages.noise import Draw, normals, uniforms
 from airflock.engine.stages.state import FlockRows, Row, agent_numbers, record_from_rows
-from airflock.engine.stages.words import X, Y, Z, call_rule, field_indices, real, rule_asks
+from airflock.engine.stages.words import *
 
 SENSOR = random.SENSOR
 
@@ -81,7 +81,7 @@ def measure(lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, *, 
     x, v, g, u = flock.position, flock.velocity, flock.errors, flock.chances
     for i in lanes:
         t = call_rule(
-            plan.sensor.measure, x=x[X][i], y=x[Y][i], z=x[Z][i], vx=v[X][i], vy=v[Y][i], vz=v[Z][i],
+            plan.sensor.measure, **row_components("", x, i), **row_components("v", v, i),
             memory=record_from_rows(i, plan.sensor.Memory, flock.sense), **{"g" + str(c): g[c][i] for c in range(12)},
             **{"u" + str(c): u[c][i] for c in range(4)}, time=time, period=numbers.c.period,
             s=agent_numbers(i, "s", flock, numbers, plan=plan),

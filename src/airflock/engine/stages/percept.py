@@ -4,7 +4,7 @@ from typing import Any
 
 from airflock.core import Model, random
 from airflock.engine.plan import Plan
-from airflock.engine.stages.words import LIMIT, ZERO, least
+from airflock.engine.stages.words import *
 from airflock.world import bvh, polygon, rays
 
 MODEL = random.MODEL

@@ -9,22 +9,7 @@ from airflock.engine.stages.air import apart
 from airflock.engine.stages.meet import pair_number
 from airflock.engine.stages.records import Decision, FlightView, PairLoopAgent
 from airflock.engine.stages.state import FlockRows
-from airflock.engine.stages.words import (
-    GONE,
-    HALF,
-    ZERO,
-    X,
-    Y,
-    Z,
-    call_rule,
-    choose,
-    field_indices,
-    integer,
-    most,
-    real,
-    totals,
-    vector,
-)
+from airflock.engine.stages.words import *
 
 PACKET = random.PACKET
 AIR = random.AIR
@@ -174,8 +159,8 @@ def glimpse(me: PairLoopAgent, j: int, got: Any, rolled: dict[str, Any], packet:
         expected[a] = apart(flock.packet[a][me.i, j] + ev[a] * since, then[a], a, w, plan=plan)
         v[a] = flock.measured_velocity[a][me.i]
     t = call_rule(
-        plan.radio.see, dx=off[X], dy=off[Y], dz=off[Z], ex=expected[X], ey=expected[Y], ez=expected[Z],
-        evx=ev[X], evy=ev[Y], evz=ev[Z], vx=v[X], vy=v[Y], vz=v[Z], since=since, period=numbers.c.period, **rolled,
+        plan.radio.see, **components("d", off), **components("e", expected), **components("ev", ev),
+        **components("v", v), since=since, period=numbers.c.period, **rolled,
         k=numbers.k,
     )  # fmt: skip
     for a in range(dims):

@@ -5,7 +5,7 @@ from typing import Any
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import FlockRows, scene_tree
-from airflock.engine.stages.words import FAR, GONE, HALF, ONE, ZERO, X, Y, Z, most, real, repeat, vector
+from airflock.engine.stages.words import *
 from airflock.world import bvh, goals
 
 

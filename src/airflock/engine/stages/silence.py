@@ -8,7 +8,7 @@ from airflock.core import silence
 from airflock.engine.plan import Plan
 from airflock.engine.stages.receive import clock_time
 from airflock.engine.stages.state import FlockRows
-from airflock.engine.stages.words import HALF, HALF_SIZES, ONE, TINY, ZERO, X, Y, Z, choose, integer, most, vector
+from airflock.engine.stages.words import *
 from airflock.world import nearest_image
 
 

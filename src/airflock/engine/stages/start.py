@@ -8,7 +8,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.percept import height_above_middle
 from airflock.engine.stages.records import WorldArrays
 from airflock.engine.stages.state import FlockRows, scene_tree
-from airflock.engine.stages.words import AWAY, HALF, LIMIT, ZERO, X, Y, Z, most, repeat, vector
+from airflock.engine.stages.words import *
 from airflock.scenarios import FORMATIONS
 from airflock.world import bvh, inside, start as places
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.records import CandidateRows
-from airflock.engine.stages.words import ZERO_ROW, IdentityRow, field_indices
+from airflock.engine.stages.words import *
 
 Row = Any  # one number per agent: row[i]
 FAULT_PREFIX = "fault_"  # what names of rows with numbers of a fault begin with

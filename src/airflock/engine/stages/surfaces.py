@@ -5,7 +5,7 @@ from typing import Any
 
 from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.state import agent_numbers, scene_tree
-from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, call_rule, least, nonzero_fields, vector
+from airflock.engine.stages.words import *
 from airflock.world import bvh, polygon
 
 
@@ -16,7 +16,7 @@ def add_surface(i: int, surface: Any, flight: FlightView) -> None:
         v[a] = flock.measured_velocity[a][i]
     t = call_rule(
         model.boundary, distance=surface.distance, nx=surface.nx, ny=surface.ny, nz=surface.nz,
-        vx=v[X], vy=v[Y], vz=v[Z], p=agent_numbers(i, "p", flock, flight.numbers, plan=plan),
+        **components("v", v), p=agent_numbers(i, "p", flock, flight.numbers, plan=plan),
     )  # fmt: skip
     # Sums go to rows, not to locals: the loop over surfaces is the outer one, so an agent comes by
     # once per surface.

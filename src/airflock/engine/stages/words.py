@@ -129,6 +129,16 @@ def call_rule(rule: Callable[..., Any] | None, **offered: Any) -> Any:
     return rule(*(offered[name] for name in inspect.signature(rule).parameters))
 
 
+def components(name: str, vector: Any) -> dict[str, Any]:
+    """Return the components of a vector as arguments of a rule, such as dx, dy and dz."""
+    return {name + axis: vector[a] for a, axis in enumerate("xyz")}
+
+
+def row_components(name: str, rows: Any, i: Any) -> dict[str, Any]:
+    """Return the components of a vector of agent i as arguments of a rule, such as vx, vy and vz."""
+    return {name + axis: rows[a][i] for a, axis in enumerate("xyz")}
+
+
 def rule_asks(rule: Callable[..., Any] | None, *names: str) -> bool:
     """Return True if a rule takes an argument of any of these names."""
     return rule is not None and bool(set(names) & set(inspect.signature(rule).parameters))
