@@ -96,7 +96,7 @@ def found_of(name):
     shape = shape_of(one.agents, 1, sequential=plan.sequential, whole_flock=bool(plan.model.flock))
     found = {
         "32": trees_of(driver.flight_driver_text, plan),
-        "64": trees_of(driver.flight_driver_text, plan.built(bits=64, keep_frames=True)),
+        "64": trees_of(driver.flight_driver_text, plan.built(bits=64, record=True)),
     }
     if found["64"] == found["32"]:
         del found["64"]

@@ -67,9 +67,8 @@ def test_commands_wait_for_a_dead_time_in_whole_steps_and_not_where_agents_move_
         load("zapotecatl_2016/best", {"body.delay": 0.4})
 
 
-def test_how_a_driver_is_built_is_no_field_to_patch():
+def test_a_plan_that_is_built_otherwise_and_back_is_itself():
     plan = plan_of(load("vasarhelyi_2018/4ms"))
-    assert plan.built(grid=True, keep_frames=True).grid and not plan.grid
-    assert plan.built(keep_frames=True).built(keep_frames=False) == plan
-    with pytest.raises(TypeError):
-        replace(plan, keep_frames=True)
+    assert plan.built(grid=True, record=True).grid and not plan.grid
+    assert plan.built(record=True).built(record=False) == plan
+    assert not plan.built(grid=True, near=True).built(grid=False).near  # which order parameters need cells for

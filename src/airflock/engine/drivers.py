@@ -26,7 +26,7 @@ def flight_text(plan: Plan) -> str:
     """Text of the driver that flies a plan, the same whether samples are kept; each recording says by which."""
     # Writing a text takes 0.06 s, half of a short interpreted flight. It is not kept on disk: a
     # plan holds functions, and no file can show that they are unchanged.
-    return _text(plan.built(keep_frames=False) if plan.record else plan)
+    return _text(plan.built(record=False) if plan.record else plan)
 
 
 @lru_cache(maxsize=256)

@@ -118,7 +118,7 @@ def flight_driver(plan: Plan, exact: bool = False) -> ModuleType:
     exact : run every line of the text; else rules are not asked about neighbours that do not count (out of range, lost,
         the agent itself), which a compiled driver asks about and then drops what they say
     """
-    return _flight_driver(plan.built(keep_frames=False) if plan.record else plan, exact)
+    return _flight_driver(plan.built(record=False) if plan.record else plan, exact)
 
 
 @cache

@@ -1,6 +1,6 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate
@@ -50,31 +50,21 @@ class GroupLaw(NamedTuple):
     varied: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True)
-class BuildOptions:
-    """How a driver is built, whatever the scenario says.
+INTEGER_NAMES = (
+    "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
+    "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born", "lag",
+)  # fmt: skip
 
-    bits        : 32 or 64 per number
-    record      : keep every sample (position, velocity, command) besides the running sums
-    given_start : the flight starts from positions and velocities that are handed over
-    grid        : neighbours by cells, all cores for one flock; else all pairs, one core
-    near        : order parameters look at pairs and links by cells, too, where their rules allow it; needs `grid`
-    absence     : agents may be absent: they lie behind those who are there (`engine.presence`)
-    """
-
-    bits: int = 32
-    keep_frames: bool = False
-    given_start: bool = False
-    grid: bool = False
-    near: bool = False
-    absence: bool = False
+NO_PACKET_TIME = -1e9  # s; time stamp of a packet that has not come
+GONE = -1.0  # s; when what is not under way is due
 
 
 @dataclass(frozen=True)
-class PlanProperties:
-    """Compile-time side of a flight: what the scenario says, and how it is built. `Plan` derives the rest from it.
+class Plan:
+    """Compile-time side of a flight: what the scenario says, how its driver is built, and what follows from both.
 
-    build     : how it is built; bits, record, given_start and grid read it
+    It is made by `plan_of` alone; `built` gives the same flight with another driver.
+
     numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
     surfaces  : surface function of each family of walls, in the order of the faces table
     dryden    : gusts are those of the Dryden spectrum
@@ -105,6 +95,12 @@ class PlanProperties:
     law       : which of all laws the stages are made for that ask one: 0 is `model`; None where there is no other
     grouped   : a rule asks for the groups of agents
     own_text  : state of the text of rules that are no part of the package: no driver outlives a change of them
+    bits      : 32 or 64 per number
+    record    : keep every sample (position, velocity, command) besides the running sums
+    given_start : the flight starts from positions and velocities that are handed over
+    grid      : neighbours by cells, all cores for one flock; else all pairs, one core
+    near      : with `grid`: order parameters look at pairs and links by cells, too, where their rules allow it
+    absence   : agents may be absent: they lie behind those who are there (`engine.absence_and_faults`)
     """
 
     model: Model
@@ -152,24 +148,13 @@ class PlanProperties:
     laws: tuple[GroupLaw, ...] = ()
     law: int | None = None
     uses_groups: bool = False
-    build: BuildOptions = BuildOptions()
     own_text: Hashable = ()
-
-
-INTEGER_NAMES = (
-    "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
-    "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born", "lag",
-)  # fmt: skip
-
-NO_PACKET_TIME = -1e9  # s; time stamp of a packet that has not come
-GONE = -1.0  # s; when what is not under way is due
-
-
-class Plan(PlanProperties):
-    """The facts of a flight, and what follows from them.
-
-    It is made by `engine.plan_of` alone; `built` gives the same flight with other build options.
-    """
+    bits: int = 32
+    record: bool = False
+    given_start: bool = False
+    grid: bool = False
+    near: bool = False
+    absence: bool = False
 
     def __hash__(self) -> int:
         return self._hash
@@ -180,38 +165,8 @@ class Plan(PlanProperties):
         return hash(tuple(getattr(self, each.name) for each in fields(self)))
 
     def built(self, **changes: Any) -> "Plan":
-        """Return this plan with other build options: fields of `BuildOptions`."""
-        return replace(self, build=replace(self.build, **changes))
-
-    @property
-    def bits(self) -> int:
-        """Bits of a number."""
-        return self.build.bits
-
-    @property
-    def record(self) -> bool:
-        """Return True if every sample is kept."""
-        return self.build.keep_frames
-
-    @property
-    def given_start(self) -> bool:
-        """Return True if the start is handed over."""
-        return self.build.given_start
-
-    @property
-    def grid(self) -> bool:
-        """Return True if neighbours are found by cells."""
-        return self.build.grid
-
-    @property
-    def near(self) -> bool:
-        """Return True if order parameters look at pairs and links by cells."""
-        return self.build.grid and self.build.near
-
-    @property
-    def absence(self) -> bool:
-        """Return True if agents may be absent."""
-        return self.build.absence
+        """Return this plan with other values of bits, record, given_start, grid, near or absence."""
+        return replace(self, **changes if changes.get("grid", self.grid) else changes | {"near": False})
 
     def of(self, law: int) -> "Plan":
         """Return this plan as the stages of one law see it: its model, and its numbers under the letter p."""
@@ -475,8 +430,18 @@ def plan_of(
     own_text = _own_text(scenario, metrics)
     key = "plan", precision, record, metrics, grid, near, given_start, absence, own_text
     if key not in scenario.engine_cache:
-        build = _build(scenario, precision, record, grid, near, given_start, absence)
-        scenario.engine_cache[key] = replace(_planned(scenario, metrics, build), own_text=own_text)
+        cells = uses_all_cores(scenario) if grid is None else grid
+        cells = cells and box_fits_cells(scenario) and uses_cells(scenario)
+        scenario.engine_cache[key] = replace(
+            _planned(scenario, metrics),
+            own_text=own_text,
+            bits=precision,
+            record=record,
+            given_start=given_start,
+            grid=cells,
+            near=cells and (metrics_use_cells(scenario) if near is None else near),
+            absence=absence or scenario.can_land or any(kind.leaves is not None for kind in scenario.fault_kinds),
+        )
     found: Plan = scenario.engine_cache[key]
     return found
 
@@ -490,38 +455,25 @@ def _own_text(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> Hashabl
     return text_state(rule for part in (*models, *kinds, *measures) if part for rule in vars(part).values())
 
 
-def _build(
-    scenario: Scenario,
-    precision: int,
-    record: bool,
-    grid: bool | None,
-    near: bool | None,
-    given_start: bool,
-    absence: bool,
-) -> BuildOptions:
-    """How the driver of a scenario is built."""
-    cells = (uses_all_cores(scenario) if grid is None else grid) and box_fits_cells(scenario) and uses_cells(scenario)
-    return BuildOptions(
-        bits=precision,
-        keep_frames=record,
-        given_start=given_start,
-        grid=cells,
-        near=cells and (metrics_use_cells(scenario) if near is None else near),
-        absence=absence or scenario.can_land or any(kind.leaves is not None for kind in scenario.fault_kinds),
-    )
-
-
-def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: BuildOptions) -> Plan:
+def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> Plan:
     """The plan itself."""
     _probe_rules(scenario)
-    laws, kinds = scenario.laws, scenario.fault_kinds
-    return make_plan(
-        scenario.model,
-        scenario.parameters,
-        scenario.order_parameters if metrics is None else metrics,
-        scenario.world,
-        scenario.numbers,
-        build=build,
+    laws, world = scenario.laws, scenario.world
+    surfaces, beyond = arena_surfaces(world)
+    return Plan(
+        model=scenario.model,
+        model_choices=constants_of(scenario.model, scenario.parameters, scenario.varied),
+        numbers=tuple(scenario.numbers.items()),
+        metrics=scenario.order_parameters if metrics is None else metrics,
+        surfaces=surfaces,
+        excursion=beyond,
+        ray=arena_ray(world),
+        edge_rule=EDGE_RULES[world.edges],
+        dimensions=int(world.dimensions),
+        obstacles=bool(world.obstacles),
+        obstacle=obstacle_rule(world),
+        polygonal=world.arena == "polygon" and world.edges != "periodic",
+        off_centre_height=is_off_centre(world),
         body=scenario.body.rule,
         body_choices=_chosen(scenario.body.numbers),
         sequential=scenario.flight.update == "sequential",
@@ -529,7 +481,7 @@ def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: Buil
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=_chosen(scenario.aero) if scenario.is_aerodynamic else (),
-        faults=kinds,
+        faults=scenario.fault_kinds,
         varied=scenario.varied,
         laws=tuple(GroupLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
         uses_groups=bool(scenario.groups) and any(law.uses_groups for law in laws),
@@ -629,31 +581,3 @@ def constants_of(
         if getattr(parameters, name) == number and ("p", name) not in varied
     }
     return tuple(sorted((usual | choices(parameters)).items()))
-
-
-def make_plan(
-    model: Model,
-    parameters: Any,
-    metrics: tuple[Metric, ...],
-    world: arena.Parameters,
-    numbers: Mapping[str, tuple[str, ...]],
-    **options: Any,
-) -> Plan:
-    """Plan for a model with these parameters (only their choices matter) in this world; numbers: fields by letter."""
-    surfaces, beyond = arena_surfaces(world)
-    return Plan(
-        model=model,
-        model_choices=constants_of(model, parameters, options.get("varied", ())),
-        numbers=tuple(numbers.items()),
-        metrics=metrics,
-        surfaces=surfaces,
-        excursion=beyond,
-        ray=arena_ray(world),
-        edge_rule=EDGE_RULES[world.edges],
-        dimensions=int(world.dimensions),
-        obstacles=bool(world.obstacles),
-        obstacle=obstacle_rule(world),
-        polygonal=world.arena == "polygon" and world.edges != "periodic",
-        off_centre_height=is_off_centre(world),
-        **options,
-    )

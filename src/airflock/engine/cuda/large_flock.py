@@ -542,7 +542,7 @@ def fly_large_flock(scenario: Scenario, plan: Plan, seed: int, start: Any = None
     """Fly one big flock and measure it at each sample."""
     flock = LargeFlock(scenario, plan, seed, start)
     every, steps = flock.times["sample_every"], flock.times["steps"]
-    once = plan.built(grid=True, keep_frames=False)
+    once = plan.built(grid=True, record=False)
     table = flock.tables.changed(sample_every=1)
     frames, series = [], []
     places = flock.state()[0]
