@@ -173,14 +173,14 @@ class World:
         )  # fmt: skip
         surfaces.boundaries(range(n), flight, self.rest["faces"])
         deciding.decide(
-            range(n), flock, numbers, whole, around, step, 0.7, None, None,
-            plan=plan, model=model, summed=fields, walled=words.nonzero_fields(model.Walls, plan.dimensions),
+            range(n), flight, step, 0.7, None, None, summed=fields,
+            walled=words.nonzero_fields(model.Walls, plan.dimensions),
         )  # fmt: skip
         state["fastest"] = motion.move(
-            range(n), range(n), flock, numbers, step, n,
+            range(n), range(n), flight, step, n,
             lambda: noise.noise(flock, whole, step, n, plan=plan),
             lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), state["held"],
-            0, 0, plan=plan, watched=True, drifts=True, kept=False,  # nobody suffers
+            0, 0, watched=True, drifts=True, kept=False,  # nobody suffers
         )  # fmt: skip
         return state
 

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from airflock.core import Model, Own, norm
-from airflock.engine.plan import Plan
-from airflock.engine.stages.records import WorldArrays
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.state import Columns, FlockRows, agent_numbers, record_from_table, scene_tree
 from airflock.engine.stages.words import *
 from airflock.world import bvh
@@ -30,24 +29,19 @@ def shared_record(i: int, flock: FlockRows, *, model: Model) -> Any:
     return model.Shared(*[flock.shared("model", name)[i] for name in model.Shared._fields])  # type: ignore[misc, union-attr]
 
 
-def goal_of(i: int, a: int, flock: FlockRows, scene: Any, *, plan: Plan) -> Any:
-    """Return the goal of agent i along one axis, m: its own, or that of the flock."""
-    return flock.goal[a][i] if plan.own else scene.aim[a]
-
-
-def goal_offset(i: int, a: int, flock: FlockRows, scene: Any, *, plan: Plan) -> Any:
-    """Offset to the goal along one axis as agent i believes, m; zero where there is none."""
+def goal_offset(i: int, a: int, flight: FlightView) -> Any:
+    """Offset to the goal of agent i, its own or the flock's, along one axis as it believes, m; zero without a goal."""
     return (
-        goal_of(i, a, flock, scene, plan=plan) - flock.measured_position[a][i]
-        if (plan.goals or plan.own) and a < plan.dimensions
+        (flight.flock.goal[a][i] if flight.plan.own else flight.around.scene.aim[a])
+        - flight.flock.measured_position[a][i]
+        if (flight.plan.goals or flight.plan.own) and a < flight.plan.dimensions
         else ZERO
     )
 
 
-def add_command(
-    i: int, own: Own, shared: Any, percept: Any, flock: FlockRows, numbers: Any, *, plan: Plan, model: Model
-) -> None:  # fmt: skip
+def add_command(i: int, own: Own, shared: Any, percept: Any, flight: FlightView) -> None:
     """Add what the law's added rule asks for to the command of agent i."""
+    plan, model, flock, numbers = flight.plan, flight.model, flight.flock, flight.numbers
     more = call_rule(
         model.added.decide, own=own, shared=shared, percept=percept, period=numbers.c.period, wing=numbers.wing,  # type: ignore[union-attr]
         aero=numbers.aero,
@@ -59,9 +53,8 @@ def add_command(
 
 
 def decide(
-    agents: Iterable[int], flock: FlockRows, numbers: Any, whole: Any, around: WorldArrays, decision: int, time: float,
-    mem: Any, percept_of: Callable[..., Any],
-    *, plan: Plan, model: Model, summed: Iterable[int], walled: Iterable[int],
+    agents: Iterable[int], flight: FlightView, decision: int, time: float, mem: Any, percept_of: Callable[..., Any],
+    *, summed: Iterable[int], walled: Iterable[int],
 ) -> None:  # fmt: skip
     """Ask each agent's law for a command, and keep what it remembers.
 
@@ -69,7 +62,9 @@ def decide(
     percept_of     : makes a record of what is perceived; its fields are those of `passes.percept.record`, in order
     summed, walled : fields of Sums and Walls that neighbours and surfaces have summed
     """
-    axes, m, w, scene = range(plan.dimensions), flock.measured_position, numbers.w, around.scene
+    plan, model, flock, numbers = flight.plan, flight.model, flight.flock, flight.numbers
+    whole, around, scene = flight.whole, flight.around, flight.around.scene
+    axes, m, w = range(plan.dimensions), flock.measured_position, numbers.w
     perceives = law_asks(model, "percept")
     # One agent after another: laws branch, cast rays and remember, so this loop is no vector loop,
     # and by cells threads share it.
@@ -103,7 +98,7 @@ def decide(
             # of the driver.
             percept = percept_of(
                 time, *[-m[a][i] if a in axes else ZERO for a in (X, Y, Z)],
-                *[goal_offset(i, a, flock, scene, plan=plan) for a in (X, Y, Z)], w.half_x, w.half_y, w.half_z,
+                *[goal_offset(i, a, flight) for a in (X, Y, Z)], w.half_x, w.half_y, w.half_z,
                 flock.number[i], decision, whole.world, whole.seed_low, whole.seed_high, whole.corners,
                 whole.obstacles, around.edges, around.spans, *seen, *casts,
             )  # fmt: skip
@@ -122,7 +117,7 @@ def decide(
             for a in axes:
                 flock.command[a][i] = o[a]
         if model.added is not None:
-            add_command(i, own, shared, percept if perceives else None, flock, numbers, plan=plan, model=model)
+            add_command(i, own, shared, percept if perceives else None, flight)
         if law_asks(model, "memory"):
             for c in field_indices(model.Memory):
                 mem[c, i] = o[3][c]

@@ -9,6 +9,7 @@ from typing import Any
 
 from airflock.core import DISTURBED_STATES, Fault
 from airflock.engine.plan import Plan
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.state import Axes, FlockRows, followed_command
 from airflock.engine.stages.words import *
 
@@ -155,12 +156,11 @@ def overrule(agents: Iterable[int], flock: FlockRows, numbers: Any, time: float,
                 c[a][i] = choose(on, t[a], c[a][i])
 
 
-def apply_motion_fault(
-    i: int, moved: Any, kind: Fault, time: Any, flock: FlockRows, numbers: Any, *, plan: Plan
-) -> Any:
+def apply_motion_fault(i: int, moved: Any, kind: Fault, time: Any, flight: FlightView) -> Any:
     """Return the velocity after a motion step as the rule `motion` of a kind of fault changes it, m/s."""
+    plan, flock = flight.plan, flight.flock
     before, command = flock.before_step, followed_command(flock, plan=plan)
     return call_rule(
         kind.motion, **row_components("v", before, i), **row_components("c", command, i), **components("n", moved),
-        dt=numbers.c.dt, **fault_arguments(i, kind, time, flock, plan=plan),
+        dt=flight.numbers.c.dt, **fault_arguments(i, kind, time, flock, plan=plan),
     )  # fmt: skip

@@ -8,6 +8,7 @@ from airflock.core import Metric
 from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import BEGUN, CALM, ENDED, GAP, SLACK, TRAVELLED, approach_bound, start_drift
 from airflock.engine.stages.measure import MeasuredMetric
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import *
 
@@ -242,25 +243,14 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
 
 
 def measure_frames(
-    first: int,
-    flock: FlockRows,
-    whole: Any,
-    n: int,
-    values: Any,
-    sums: Any,
-    frames: Any,
-    series: Any,
-    frame_period: float,
-    *,
-    plan: Plan,
-    stages: Stages,
-    order: Order,
-    sampled: Mapping[str, tuple[Sampled, int]],
-) -> int:
+    first: int, flight: FlightView, n: int, values: Any, sums: Any, frames: Any, series: Any, frame_period: float,
+    *, stages: Stages, order: Order, sampled: Mapping[str, tuple[Sampled, int]],
+) -> int:  # fmt: skip
     """Measure a recording, whose first frame has the number `first`: the values of each frame to `series`.
 
     frame_period : s
     """
+    plan, flock, whole = flight.plan, flight.flock, flight.whole
     # Recordings are measured by the very stages of a flight, so that a score never depends on where
     # it was computed.
     for step in range(first, first + frames.shape[0]):

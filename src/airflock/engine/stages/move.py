@@ -7,6 +7,7 @@ from airflock.core import norm
 from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import velocity_beside_drift
 from airflock.engine.stages.faults import apply_motion_fault, has_fault
+from airflock.engine.stages.records import FlightView
 from airflock.engine.stages.state import FlockRows, agent_numbers, followed_command, record_from_rows
 from airflock.engine.stages.words import *
 
@@ -50,11 +51,11 @@ def measured_velocity(i: int, a: int, flock: FlockRows, *, plan: Plan) -> Any:
 
 
 def apply_body_and_faults(
-    lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
-    hurt_first: int, hurt_end: int, *, plan: Plan, kept: bool,
+    lanes: Iterable[int], flight: FlightView, time: Any, g: Any, wind: tuple[Any, Any, Any], hurt_first: int,
+    hurt_end: int, *, kept: bool,
 ) -> None:  # fmt: skip
     """Advance velocities by the rule of the body, then apply faults of motion on the affected lanes."""
-    v = flock.velocity
+    plan, flock, v = flight.plan, flight.flock, flight.flock.velocity
     faults = plan.suffers("motion")
     hurt = () if not faults else lanes if plan.sequential else lanes_between(lanes, hurt_first, hurt_end)
     for i in () if kept else hurt:
@@ -63,13 +64,13 @@ def apply_body_and_faults(
     # All lanes take the plain loop of the body; rules of faults are called afterwards over the
     # lanes that may suffer. Two loops of the body (with and without faults) gave other last bits
     # and cost more than this second pass.
-    apply_body(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
+    apply_body(lanes, flight, time, g, wind)
     # Faults are applied one after another, each to what the one before left of the motion.
     for i in hurt:
         t = (v[X][i], v[Y][i], v[Z][i])
         for kind in faults:
-            on = has_fault(i, kind, time, flock, numbers)
-            s = apply_motion_fault(i, t, kind, time, flock, numbers, plan=plan)
+            on = has_fault(i, kind, time, flock, flight.numbers)
+            s = apply_motion_fault(i, t, kind, time, flight)
             t = (choose(on, s[X], t[X]), choose(on, s[Y], t[Y]), choose(on, s[Z], t[Z]))
         for a in range(plan.dimensions):
             v[a][i] = t[a]
@@ -77,10 +78,9 @@ def apply_body_and_faults(
             flock.before_step[a][i] = t[a]
 
 
-def apply_body(
-    lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
-) -> None:
+def apply_body(lanes: Iterable[int], flight: FlightView, time: Any, g: Any, wind: tuple[Any, Any, Any]) -> None:
     """Advance velocities by the rule of the body."""
+    plan, flock, numbers = flight.plan, flight.flock, flight.numbers
     v, command = flock.velocity, followed_command(flock, plan=plan)
     # One call of the rule per lane, whatever the body: what it needs of wind, noise or memory is
     # decided when the driver is made, so that the loop has no branch.
@@ -93,9 +93,9 @@ def apply_body(
             my=measured_velocity(i, Y, flock, plan=plan),
             mz=measured_velocity(i, Z, flock, plan=plan),
             **row_components("g", g, i),
-            wx=wx,
-            wy=wy,
-            wz=wz if plan.dimensions == 3 else ZERO,
+            wx=wind[X],
+            wy=wind[Y],
+            wz=wind[Z] if plan.dimensions == 3 else ZERO,
             memory=record_from_rows(i, plan.body.Memory, flock.body),
             dt=numbers.c.dt,
             wing=numbers.wing,
@@ -108,9 +108,8 @@ def apply_body(
 
 
 def move(
-    agents: Iterable[int], lanes: Iterable[int], flock: FlockRows, numbers: Any, step: int, n: int,
-    noise: Callable[[], None], gusts: Callable[[], Any], held: Any, hurt_first: int, hurt_end: int,
-    *, plan: Plan, watched: bool, drifts: bool, kept: bool,
+    agents: Iterable[int], lanes: Iterable[int], flight: FlightView, step: int, n: int, noise: Callable[[], None],
+    gusts: Callable[[], Any], held: Any, hurt_first: int, hurt_end: int, *, watched: bool, drifts: bool, kept: bool,
 ) -> Any:  # fmt: skip
     """Advance velocities by the body and positions by the velocity before or after; return the largest squared speed.
 
@@ -120,6 +119,7 @@ def move(
     hurt_first, hurt_end : lanes that hold all agents with a fault of motion (`stages.faults.struck`)
     kept                 : whether their velocities are kept from step to step, so that no step copies them
     """
+    plan, flock, numbers = flight.plan, flight.flock, flight.numbers
     x, v = flock.position, flock.velocity
     g = aliases()
     if rule_asks(plan.body.move, "gx", "gy", "gz"):
@@ -134,7 +134,7 @@ def move(
     if plan.windy:
         wx, wy, wz = gusts()
     if plan.integration != "old":
-        apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
+        apply_body_and_faults(lanes, flight, time, g, (wx, wy, wz), hurt_first, hurt_end, kept=kept)
     fastest = ZERO
     # Over whole vectors, with absent lanes counted as standing: the remainder of a loop costs three
     # times as much per agent as its vector part.
@@ -154,7 +154,7 @@ def move(
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
-        apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
+        apply_body_and_faults(lanes, flight, time, g, (wx, wy, wz), hurt_first, hurt_end, kept=kept)
     # Edges come last, when the step is done: a periodic box takes the agent to its other side, a
     # mirror turns its velocity.
     if plan.edge_rule:
