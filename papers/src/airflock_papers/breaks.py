@@ -15,7 +15,8 @@ claim holds beforehand may then be another by chance. That its change breaks it 
 
 import json
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -260,3 +261,26 @@ def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Worse]:
 
 if __name__ == "__main__":
     tables.renew("Make the change of every claim and commit the results.", COMMITTED, Row._fields, fly_all)
+
+
+def report_all(folder: Path, say: Callable[[str], None], threads: int | None = None) -> tables.Report:
+    """Check every claim of every paper under its change; it fails where one held that was seen to turn red."""
+    before = committed()
+    rows = fly_all(folder, say, threads)
+    lost = worse(before, rows)
+    lines = []
+    for row, elsewhere in lost:
+        why = f" (not judged: turned red on {elsewhere})" if elsewhere else ""
+        lines.append(f"{row.paper} {row.id}: {row.result} with {row.change} ({row.ours}, then {row.changed}){why}")
+    message = ", ".join(f"{number} {result}" for result, number in Counter(row.result for row in rows).items())
+    lines.append(f"{len(rows)} claims under their changes: {message}")
+    listed = [each.row._asdict() | {"elsewhere": each.elsewhere} for each in lost]
+    content = {"claims": [row._asdict() for row in rows], "worse": listed}
+    return tables.Report(lines, content, all(each.elsewhere for each in lost))
+
+
+def report(rows: Sequence[Break]) -> tables.Report:
+    """Report the claims of one paper under their changes; it fails where one still holds."""
+    lines = [f"{r.id}: {r.result} with {r.change} ({r.ours:.4g}, then {r.changed:.4g})" for r in rows]
+    lines.append(", ".join(f"{sum(row.result == result for row in rows)} {result}" for result in RESULTS))
+    return tables.Report(lines, [row._asdict() for row in rows], all(row.result != GREEN for row in rows))

@@ -5,9 +5,24 @@ import io
 from collections.abc import Callable, Iterable
 from importlib import resources
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from airflock.support import AirflockError, atomic
+from airflock.support import AirflockError, atomic, result_group
+
+
+class Report(NamedTuple):
+    """What a command prints of flown claims: lines, or one JSON document; shown : False where it fails."""
+
+    lines: list[str]
+    content: Any
+    shown: bool
+
+    def __rich__(self) -> Any:
+        return result_group(*self.lines)
+
+    def document(self) -> Any:
+        """Return the report as plain values."""
+        return self.content
 
 
 def read(name: str, command: str) -> list[dict[str, str]]:

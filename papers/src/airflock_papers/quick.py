@@ -122,3 +122,20 @@ def changed(before: Iterable[Verdict], after: Iterable[Verdict]) -> list[Changed
 
 if __name__ == "__main__":
     tables.renew("Fly the small form of every page and commit its verdicts.", COMMITTED, Verdict._fields, fly)
+
+
+def report_all(folder: Path, say: Callable[[str], None], threads: int | None = None) -> tables.Report:
+    """Fly the small form of every paper; it fails where a verdict is not the one committed for this processor."""
+    before = committed()
+    rows = fly(folder, say, threads)
+    other = changed(before, rows)
+    lines = []
+    for row in other:
+        message = f"{row.committed or 'not committed'} is now {row.found or 'not flown'}"
+        why = f" (not judged: committed as flown on {row.elsewhere})" if row.elsewhere else ""
+        lines.append(f"{row.paper} {row.id}: {message}{why}")
+    lines.append(f"{len(rows)} claims in their small form, {len(other)} of another verdict than the committed one")
+    if any(row.elsewhere for row in other):
+        lines.append("On another kind of processor the same seeds give other flights; a few verdicts may differ.")
+    content = {"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in other]}
+    return tables.Report(lines, content, all(row.elsewhere for row in other))
