@@ -16,6 +16,7 @@ import airflock
 from airflock.cli.command import VERBS
 from airflock.cli.main import app
 from airflock.cli.options import ALIASES, SHARED, read_declaration
+from airflock.support import log
 
 PACKAGES = {"plots", "measures"}
 CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
@@ -283,3 +284,13 @@ def test_arguments_with_a_unit_say_it(name):
         if argument in inspect.signature(the(name)).parameters:
             (told,) = re.findall(rf"^[\w, ]*\b{argument}\b[\w, ]* : ?.*(?:\n .*)*", text, re.M)[:1]
             assert re.search(rf"\b{unit}\b|second", told), (argument, told)
+
+
+def test_functions_report_to_the_logger_that_is_silent_until_somebody_listens(caplog):
+    saying = {name for name in FUNCTIONS if "say" in inspect.signature(the(name)).parameters}
+    assert saying >= {"score", "simulate", "sweep", "load_tracks", "fleet"}
+    for name in saying - {"watch", "why"}:  # nobody would find the page of one; the other is silent by default
+        assert inspect.signature(the(name)).parameters["say"].default is log, name
+    code = "from airflock.support import log; import logging; log('chosen'); logging.basicConfig(level=20); log('heard')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "" and done.stderr == "INFO:airflock:heard\n"

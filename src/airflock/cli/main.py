@@ -122,6 +122,7 @@ def main() -> None:
         sys.unraisablehook = _repeat_interrupt
     atexit.register(gc.freeze)  # a last look for garbage among what a compiler leaves takes 0.6 s
     warnings.showwarning = _show_warning
+    warnings.simplefilter("once", UserWarning, append=True)  # of many files or flights
     try:
         try:
             app(standalone_mode=True)

@@ -18,7 +18,7 @@ from airflock.fleets.realtime import DEFAULT_CLIENT, FLEET_MODES, fly_in_realtim
 from airflock.parts.metrics import reported_values
 from airflock.recordings import measure_recording, with_units
 from airflock.scenarios import Scenario, check_seeds, load, presets, scenario_variant
-from airflock.support import ScenarioError, collect_errors, expand_path, suggest
+from airflock.support import ScenarioError, collect_errors, expand_path, log, suggest
 
 VEHICLE_KINDS = ("px4", "ardupilot")
 VEHICLE_BODIES = ("multirotor", "quadrotor", "autopilot")
@@ -109,7 +109,7 @@ def fleet(
     ground: bool = False,
     card: str | os.PathLike[str] | None = None,
     done: Callable[[], None] | None = None,
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] | None = log,
 ) -> FleetRuns:
     """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step or on the real clock.
 
@@ -148,7 +148,7 @@ def fleet(
     done : callable, optional
         Called after each second that is flown.
     say : callable, optional
-        Called with a line when the card is written, before the first flight.
+        Called with a line when the card is written, before the first flight; by default the logger `airflock`.
 
     Returns
     -------

@@ -24,7 +24,7 @@ from airflock.recordings.dataset import recording_frames
 from airflock.recordings.flown_scenario import power_settings, scenario_of_recording
 from airflock.runs import score_scenarios
 from airflock.scenarios import Scenario, check_seeds, scenario_variant, settings_dict
-from airflock.support import RecordingError, is_number
+from airflock.support import RecordingError, is_number, log
 
 
 def score(
@@ -36,7 +36,7 @@ def score(
     precision: int = 32,
     done: Callable[[], None] | None = None,
     device: str = "cpu",
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] | None = log,
     scheduler: str | None = None,
     aero: bool = False,
     groups: bool = False,
@@ -63,7 +63,7 @@ def score(
     device : str
         cpu, cuda (a GPU, all flights together), python, or auto, which reports its choice to `say`.
     say : callable, optional
-        Called with the choice of auto.
+        Called with the choice of auto; by default the logger `airflock`.
     scheduler : str, optional
         Address of a dask scheduler whose workers fly, instead of this process.
     aero : bool

@@ -18,7 +18,7 @@ from airflock.engine import Flight, driver_text, fly_world, pick_device
 from airflock.recordings.attributes import FAULTS_ATTRIBUTE
 from airflock.recordings.dataset import DIMENSIONS, VARIABLE_UNITS, box_sides, make_dataset, nearest_image
 from airflock.scenarios import MODELS, Event, Scenario, check_seed, group_names, law_hash, load_if_named, step_counts
-from airflock.support import FlightError, processor_name, toolchain_versions
+from airflock.support import FlightError, log, processor_name, toolchain_versions
 
 Array = NDArray[Any]
 
@@ -30,7 +30,7 @@ def simulate(
     precision: int = 32,
     start: Any = None,
     device: str = "cpu",
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] | None = log,
     events: Sequence[Event | Mapping[str, Any]] = (),
     keep: Sequence[str] = (),
 ) -> xr.Dataset:
@@ -49,7 +49,7 @@ def simulate(
     device : str
         cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which reports its choice to `say`.
     say : callable, optional
-        Called with the choice of auto.
+        Called with the choice of auto; by default the logger `airflock`.
     events : sequence of mappings, optional
         What is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it.
     keep : sequence of str

@@ -37,6 +37,7 @@ from airflock.support import (
     atomic,
     collect_errors,
     expand_path,
+    log,
     suggest,
 )
 
@@ -56,7 +57,7 @@ def sweep(
     precision: int = 32,
     done: Callable[[], None] | None = None,
     device: str = "cpu",
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] | None = log,
     scheduler: str | None = None,
     out: str | os.PathLike[str] | None = None,
     resume: bool = False,
@@ -87,7 +88,7 @@ def sweep(
     device : str
         cpu, cuda, python, or auto, which reports its choice to `say`.
     say : callable, optional
-        Called with the choice of auto.
+        Called with the choice of auto; by default the logger `airflock`.
     scheduler : str, optional
         Address of a dask scheduler whose workers fly, instead of this process.
     out : str or path (DIR), optional

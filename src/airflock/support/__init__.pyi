@@ -78,6 +78,7 @@ from .many_tests import holm_correction as holm_correction
 from .rendering import (
     format_cell as format_cell,
     interval_lines as interval_lines,
+    log as log,
     result_group as result_group,
     result_table as result_table,
 )

@@ -1,4 +1,4 @@
-"""Tables and lines of results for a terminal: what `__rich__` of a result returns."""
+"""Tables and lines of results for a terminal: what `__rich__` of a result returns; lines of work under way."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -6,6 +6,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Group
     from rich.table import Table
+
+
+def log(line: str) -> None:
+    """Report a line of work under way to the logger `airflock`, which is silent until a program listens to it."""
+    import logging  # not when the package is imported
+
+    logger = logging.getLogger("airflock")
+    if not logger.handlers:
+        logger.addHandler(logging.NullHandler())
+    logger.info(line)
 
 
 def result_table(title: str, columns: str, rows: Sequence[Sequence[str]], **how: Any) -> "Table":

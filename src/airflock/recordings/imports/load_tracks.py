@@ -37,7 +37,7 @@ from airflock.recordings.imports.track import (
 )
 from airflock.recordings.imports.track_checks import SINCE_1970, SLOW
 from airflock.recordings.reader_process import refuse_archive
-from airflock.support import RecordingError, as_error, expand_path, is_number
+from airflock.support import RecordingError, as_error, expand_path, is_number, log
 
 
 def load_tracks(
@@ -60,7 +60,7 @@ def load_tracks(
     decimal: str = ".",
     delimiter: str = "",
     precision: int = 32,
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] | None = log,
     done: Callable[[float], None] = ignore_progress,
 ) -> xr.Dataset:
     """Make a recording of tracks from other programs and vehicles: flight logs and animals.
@@ -108,7 +108,7 @@ def load_tracks(
     precision : int
         Bits per number, 32 or 64; far from the origin, where 32 do not tell a centimetre, 64.
     say, done : callable, optional
-        Called with each note, and with the share that has been read.
+        Called with each note, by default the logger `airflock`, and with the share that has been read.
 
     Returns
     -------
