@@ -1,6 +1,7 @@
 """Verbs evolve and harden from the command line, with real but tiny flights."""
 
 import json
+import re
 import signal
 import sqlite3
 import subprocess
@@ -29,6 +30,12 @@ def landed(folder):
         return 0  # not yet made
 
 
+def planned(lines):
+    """Flights of the search and of finals as the plan says before anything flies."""
+    found = re.search(r"^plan: ([\d,]+) flights .* then about ([\d,]+) of finalists$", lines, re.M)
+    return [int(number.replace(",", "")) for number in found.groups()]
+
+
 def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path, request):
     asked = ["evolve", NAME, "--population", 4, "--generations", 2, *SHORT, "--json", "--out", tmp_path / "a"]
     done = called(*asked)
@@ -36,6 +43,10 @@ def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path, request):
     found = json.loads(done.stdout)
     assert found["working_ranges"]["candidates"] == 8 and found["fitness"]["seeds"] == 100
     assert tomllib.loads((tmp_path / "a" / "result.toml").read_text())["parameters"] == found["parameters"]
+    search, finals = planned(done.stderr)
+    with sqlite3.connect(tmp_path / "a" / "evaluations.sqlite") as connection:
+        flown = dict(connection.execute("SELECT stage = 'search', count(*) FROM flight GROUP BY 1").fetchall())
+    assert flown[1] == search and flown[0] <= finals
     request.getfixturevalue("undrawn")  # one set of pictures is enough
     flown = called("run", tmp_path / "a" / "best.toml", "--json", "--first-seed", 3)
     assert flown.returncode == 0 and "fitness" in json.loads(flown.stdout)["runs"][0]

@@ -67,26 +67,18 @@ def import_tracks(o: SimpleNamespace, errors: ErrorCollector) -> None:
     return terminal.print_message(f"saved {o.save}")
 
 
-def reading_progress(files: int, quiet: bool) -> Any:
-    """Show a bar that follows the share of each file that has been read."""
+@contextmanager
+def reading_progress(files: int, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """Show the share of files that has been read; yields what takes the share of the file under way."""
+    with progress_line(quiet) as line:
+        read = 0
 
-    @contextmanager
-    def shown() -> Any:
-        with counting_parts("reading", 100 * files, quiet=quiet) as step:
-            state = {"file": 0, "share": 0.0, "reported": 0}
+        def done(share: float) -> None:
+            nonlocal read
+            line.update("reading", read + min(1.0, share), files)
+            read += share >= 1.0
 
-            def done(share: float) -> None:
-                state["share"] = min(1.0, share)
-                ahead = int(100 * (state["file"] + state["share"]))
-                while state["reported"] < ahead:
-                    step()
-                    state["reported"] += 1
-                if share >= 1.0:
-                    state["file"], state["share"] = state["file"] + 1, 0.0
-
-            yield done
-
-    return shown()
+        yield done
 
 
 def _origin(text: str | None) -> tuple[float, float, float] | None:

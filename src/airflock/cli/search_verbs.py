@@ -61,6 +61,8 @@ def evolve(o: SimpleNamespace, errors: ErrorCollector) -> None:
     mended = runs.open_folder(place, study, resume=o.resume)
     notes = [*(note for each in study.scenarios for note in each.notes), *study.notes, taken, mended]
     terminal.print_notes([note for note in notes if note])
+    if not o.quiet:
+        terminal.print_message(search.study_plan(study))
     begin = time.perf_counter()
     executor = search.study_executor(study, o.scheduler, o.threads, o.timeout)
     with run_progress(o.quiet or o.json) as watch:

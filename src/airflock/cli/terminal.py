@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from threading import Lock
-from typing import Any, Protocol
+from typing import Any
 
 from airflock import view
 from airflock.support import format_cell
@@ -138,8 +138,8 @@ FIRST_LINE_AFTER, LINE_INTERVAL = 10.0, 30.0  # s: before the first line of a lo
 INTERVAL_SHARE = 0.1  # of the time so far that passes at least between two lines: a day gives some seventy
 
 
-class ProgressLine(Protocol):
-    """Progress of the work, updated as it changes."""
+class ProgressLine:
+    """Progress of the work, updated as it changes; this one prints nothing."""
 
     def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
         """Show the work under way, the amount done, and the total (None: unknown)."""
@@ -152,7 +152,7 @@ class ProgressLine(Protocol):
 def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
     """Return the progress for standard error: none if quiet, a bar on a terminal, or lines for a log."""
     if quiet:
-        yield SilentProgress()
+        yield ProgressLine()
     elif sys.stderr.isatty():
         with _progress_bar() as bar:
             yield bar
@@ -160,17 +160,7 @@ def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
         yield LogProgress()
 
 
-class SilentProgress:
-    """Progress that prints nothing, nor the lines that would stay above it."""
-
-    def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
-        """Print nothing."""
-
-    def say(self, text: str) -> None:
-        """Print nothing."""
-
-
-class LogProgress:
+class LogProgress(ProgressLine):
     """Plain lines for a file or the log of a cluster, each with amount done, rate, and time left."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
@@ -243,7 +233,7 @@ def _progress_bar() -> Iterator[ProgressLine]:
     with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as drawn:
         task: Any = None
 
-        class Bar:
+        class Bar(ProgressLine):
             def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
                 nonlocal task
                 pace.update(done, total)

@@ -37,7 +37,7 @@ from airflock.runs import (
     write_toml_file,
 )
 from airflock.scenarios import Scenario, load, scenario_variant
-from airflock.search.generations import Evaluator, conclude_study, run_search
+from airflock.search.generations import Evaluator, conclude_study, run_search, total_finals, total_flights
 from airflock.search.study import (
     Objective,
     Study,
@@ -187,6 +187,14 @@ def study_executor(
 ) -> Executor:
     """Make the executor of a study: threads of this process, or the workers of a dask scheduler."""
     return make_executor(study_tasks(study), scheduler=scheduler, threads=threads, timeout=timeout)
+
+
+def study_plan(study: Study) -> str:
+    """Return in words what a study flies: its search, and about how much of finals."""
+    runs = study.whole("restarts") + 1
+    search = f"{study.whole('generations')} generations of {study.whole('population')} candidates"
+    times = f", {runs} times" if runs > 1 else ""
+    return f"plan: {total_flights(study):,} flights ({search}{times}), then about {total_finals(study):,} of finalists"
 
 
 def study_tasks(study: Study) -> list[ScenarioTask]:

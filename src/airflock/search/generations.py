@@ -383,6 +383,13 @@ def _asked(store: FlightStore, batch: CandidateBatch, points: NDArray[np.float64
 SCORE = CandidateBatch("score", 0, 0)
 
 
+def total_finals(study: Study) -> int:
+    """Return about how many flights choose among finalists and judge the winner."""
+    flights = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
+    flights += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
+    return flights * len(study.scenarios)
+
+
 def conclude_study(
     study: Study,
     store: FlightStore,
@@ -401,9 +408,7 @@ def conclude_study(
     first = study.objectives[0]
     table = candidate_table(store, [objective.name for objective in study.objectives])
     sound = _sound_candidates(study, store, table, folder)
-    flights = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
-    flights += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
-    tally = ProgressTally("finals", flights * len(study.scenarios), on_progress, "finalists on fresh seeds")
+    tally = ProgressTally("finals", total_finals(study), on_progress, "finalists on fresh seeds")
     evaluator = Evaluator(study, store, executor, tally.note)
     points, origins = select_finalists(evaluator, sound, centres)
     rows, i = fly_finalists(evaluator, points)

@@ -43,7 +43,6 @@ from airflock.studio.page_scene import (
     PageScene,
     available_colourings,
 )
-from airflock.studio.player import Player
 from airflock.support import (
     MAX_BYTES,
     AirflockError,
@@ -590,9 +589,9 @@ class TuningPanel(PagePanel):
         )
         panel.row(
             {
-                "Save scenario (.toml)": self.ask(self._save_toml),
-                "Save flight (.nc)": self.ask(self._save_recording),
-                "Save replay (.html)": self.ask(self._save_replay),
+                "Save scenario (.toml)": self.ask(lambda: self._save(player.save_toml, "_tuned.toml")),
+                "Save flight (.nc)": self.ask(lambda: self._save(player.save_recording, f"_seed{player.seed}.nc")),
+                "Save replay (.html)": self.ask(lambda: self._save(player.save_replay, f"_seed{player.seed}.html")),
             }
         )
         self.command = panel.text()
@@ -662,16 +661,10 @@ class TuningPanel(PagePanel):
         self.setting_field.value = ""
         self.show_values()
 
-    def _save_toml(self) -> None:
-        self._saved(self.player.save_toml(free_path(Path(f"{file_stem(self.player)}_tuned.toml"))))
-
-    def _save_recording(self) -> None:
-        self._saved(self.player.save_recording(free_path(Path(f"{file_stem(self.player)}_seed{self.player.seed}.nc"))))
-
-    def _save_replay(self) -> None:
-        self._saved(self.player.save_replay(free_path(Path(f"{file_stem(self.player)}_seed{self.player.seed}.html"))))
-
-    def _saved(self, path: Path) -> None:
+    def _save(self, save: Callable[[Path], Path], ending: str) -> None:
+        """Save to a free name in the folder where the page was opened, after the file of the active pane."""
+        stem = Path(self.player.side.origin.where).with_suffix("").name
+        path = save(free_path(Path(f"{stem}{ending}")))
         self.player.note = f"saved {path.absolute()}"
         self.player.fault(self.player.note)
         self.widgets.notify("Saved", str(path.absolute()))
@@ -709,11 +702,6 @@ def parse_setting(text: str, scenario: Scenario) -> tuple[str, Any]:
     whole = expand_short_keys({key: found}, records, errors)
     errors.raise_errors()
     return next(iter(whole.items()))
-
-
-def file_stem(player: Player) -> str:
-    """Return the stem of file names of the active pane."""
-    return Path(player.side.origin.where).with_suffix("").name
 
 
 NO_LINES = np.zeros((0, 2, 3))

@@ -220,18 +220,19 @@ class DrawnFlock:
         counts = {"n_coll", "phi_coll", "collisions"} & set(scalar_names(scenario.metrics.rule, measured))
         self.near = float(measured.r_coll) if counts else 0.0  # fish have no collisions
         self.period = measures.world_period(scenario)
-        self.position, self.velocity = side.motion
-        self.pairs = measures.AgentPairs(self.position, self.period)
+        self._take(*side.motion)
+
+    def _take(self, position: NDArray[Any], velocity: NDArray[Any]) -> None:
+        self.position, self.velocity = position, velocity
+        self.pairs = measures.AgentPairs(position, self.period)
 
     def look(self) -> None:
         """Take the present moment; for a flight that stopped, keep the last one that can be drawn."""
-        position, velocity = self.side.motion
+        motion = self.side.motion
         # A diverged flight keeps its last finite picture: nan would spread through the meshes of
         # the page.
-        if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
-            return
-        self.position, self.velocity = position, velocity
-        self.pairs = measures.AgentPairs(self.position, self.period)
+        if np.isfinite(motion).all():
+            self._take(*motion)
 
     def links(self, kind: str) -> tuple[NDArray[Any], NDArray[np.uint8]]:
         """Return lines between agents, and their colours: paler where a packet is more likely lost."""
