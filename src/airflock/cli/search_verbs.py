@@ -67,10 +67,8 @@ def evolve(o: SimpleNamespace, errors: ErrorCollector) -> None:
     executor = search.study_executor(study, o.scheduler, o.threads, o.timeout)
     with run_progress(o.quiet or o.json) as watch:
         result = search.run_study(study, place, executor, watch, sensitivity=o.sensitivity)
-    if o.json:
-        terminal.print_json({**result.document(), "folder": str(o.out), "seconds": time.perf_counter() - begin})
-    elif not o.quiet:
-        terminal.print_result(result)
+    if o.json or not o.quiet:
+        terminal.print_result(result, o.json, folder=str(o.out), seconds=time.perf_counter() - begin)
     if result.dead_reason:
         terminal.print_message(f"airflock: {result.scenario.name}: {result.dead_reason}")
         raise typer.Exit(1)
@@ -191,12 +189,7 @@ def tune(o: SimpleNamespace, errors: ErrorCollector) -> None:
             line.say(text)
 
         tuning = search.tune(what, folder, budget=seconds, limit=limits, watch=watch, note=note, **how)
-    if o.json:
-        terminal.print_json(tuning.document())
-    else:
-        _print_tuned(tuning, shown)
-    if not tuning.shown:
-        raise typer.Exit(1)
+    _print_tuned(tuning, shown, o.json)
 
 
 def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -> str:
@@ -216,9 +209,12 @@ def _tuned_scenario(base: Any, like: str | None) -> Any:
     return base if like is not None else search.prepare_start(base)[0]
 
 
-def _print_tuned(tuning: Any, shown: list[str]) -> None:
+def _print_tuned(tuning: Any, shown: list[str], as_json: bool = False) -> None:
     """Print the notes that were not printed during the search, and the result."""
-    terminal.print_result(result_group(*(f"start: {note}" for note in tuning.notes if note not in shown), tuning))
+    for note in () if as_json else tuning.notes:
+        if note not in shown:
+            typer.echo(f"start: {note}")
+    terminal.print_result(tuning, as_json)
 
 
 @verb(PANEL, "airflock.certify", f"{SHARED} law precision out plot", without="folder")
@@ -291,12 +287,7 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
         terminal.print_message(f"saved {out}")
     if plot is not None:
         terminal.save_picture(view.plot_certificate(result), plot)
-    if as_json:
-        terminal.print_json({**result.document(), "seconds": result.seconds})
-    else:
-        terminal.print_result(result)
-    if not result.shown:
-        raise typer.Exit(1)
+    terminal.print_result(result, as_json, seconds=result.seconds)
 
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:

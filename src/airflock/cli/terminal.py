@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
+import typer
+
 from airflock import view
 from airflock.support import format_cell
 
@@ -96,14 +98,20 @@ def print_json(value: Any) -> None:
     sys.stdout.write(json.dumps(to_json_value(value), ensure_ascii=False) + "\n")
 
 
-def print_result(result: Any, as_json: bool = False) -> None:
-    """Print what a verb returned: as it prints itself, or one JSON object of its `document()` or its plain values."""
+def print_result(result: Any, as_json: bool = False, **more: Any) -> None:
+    """Print what a verb returned: as it prints itself, or one JSON object of its `document()` or its plain values.
+
+    more : further values of the JSON object. Exit with status 1 for a limit or claim that is not `shown` to hold.
+    """
     if as_json:
-        print_json(result.document() if hasattr(result, "document") else result)
+        document = result.document() if hasattr(result, "document") else result
+        print_json({**document, **more} if more else document)
     else:
         from rich.console import Console
 
         Console().print(result, crop=False)
+    if not getattr(result, "shown", True):
+        raise typer.Exit(1)
 
 
 def save_picture(figure: Any, path: Any) -> None:
