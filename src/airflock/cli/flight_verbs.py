@@ -433,22 +433,15 @@ def display(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
 
 def _print_display(rows: list[dict[str, Any]]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
     names = {
         "time": "formed\nafter (s)", "error": "error\n(m)", "worst": "worst\n(m)", "drones": "drones",
         "collisions": "hit\nflying", "hulls": "hit\nhovering", "struck": "hit by\nfalling",
         "reassignment_count": "points\nanew",
     }  # fmt: skip
-    table.add_column("shape", overflow="fold")
-    for title in names.values():
-        table.add_column(title, justify="right", no_wrap=True)
-    for row in rows:
-        table.add_row(row["shape"], *(format_cell(float(row[key])) for key in names))
-    Console().print(table)
+    lines = [(row["shape"], *(format_cell(float(row[key])) for key in names)) for row in rows]
+    table = result_table("", "; ".join(["shape", *(f">|{head}" for head in names.values())]), lines, overflow="fold")
+    table.show_edge, table.pad_edge, table.collapse_padding = False, False, True  # eighty columns take it
+    terminal.print_result(table)
 
 
 @verb(PANEL, "airflock.watch", "settings law trust agents")

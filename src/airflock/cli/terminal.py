@@ -12,7 +12,7 @@ from typing import Any
 import typer
 
 from airflock import view
-from airflock.support import format_cell
+from airflock.support import format_cell, result_group, result_table
 
 
 def column_statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -52,39 +52,29 @@ def print_score_table(
 
     What no flight has (a clearance where nothing stands) is named in one line below instead of a number.
     """
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    summary = column_statistics(rows)
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
-    table.add_column("order parameter", style="bold")
-    table.add_column("mean ± sd" if len(rows) > 1 else "value", justify="right")
-    if len(rows) > 1:
-        table.add_column("median", justify="right")
-    if published:
-        table.add_column("published", justify="right", style="cyan")
-    table.add_column("unit")
-    table.add_column("meaning", style="dim")
-    untold = [key for key, mean in summary["mean"].items() if _is_unmeasured(key, mean) and key not in published]
-    for key in [key for key in summary["mean"] if key not in untold]:
-        unit, meaning = units_and_meanings.get(key, ("", ""))
+    summary, several = column_statistics(rows), len(rows) > 1
+    heads = f"*order parameter; >{'mean ± sd; >median' if several else 'value'}{'; >+published' * bool(published)}"
+    lines, untold = [], []
+    for key, value in summary["mean"].items():
+        if _is_unmeasured(key, value) and key not in published:
+            untold.append(key)
+            continue
         missing = "never" if key.startswith("time_to_") else "nan"  # only an event can never happen
-        mean = format_cell(summary["mean"][key], missing)
-        spread = summary["std"][key]
-        single = len(rows) == 1 or isinstance(spread, list) or spread != spread
+        mean, spread = format_cell(value, missing), summary["std"][key]
+        single = not several or isinstance(spread, list) or spread != spread
         cells = [key, mean if single else f"{mean} ± {spread:.2g}"]
-        cells += [format_cell(summary["median"][key], missing)] if len(rows) > 1 else []
+        cells += [format_cell(summary["median"][key], missing)] if several else []
         if published:
-            entry = published.get(key)
-            spread = "" if entry is None or entry[1] is None else f" ± {entry[1]:.2g}"
-            cells += ["" if entry is None else f"{format_cell(entry[0])}{spread}"]
-        table.add_row(*cells, unit, meaning)
-    Console().print(table)
+            figure, deviation = published.get(key, (None, None))
+            spread = "" if deviation is None else f" ± {deviation:.2g}"
+            cells += ["" if figure is None else f"{format_cell(figure)}{spread}"]
+        lines.append((*cells, *units_and_meanings.get(key, ("", ""))))
+    print_result(result_table(title, f"{heads}; unit; ~meaning", lines))
     if untold:
-        Console().print(
-            f"not shown, because there is nothing to measure: {', '.join(untold)}", style="dim", soft_wrap=True
-        )
+        from rich.text import Text
+
+        words = f"not shown, because there is nothing to measure: {', '.join(untold)}"
+        print_result(result_group(Text(words, style="dim", no_wrap=True, overflow="ignore")))
 
 
 def _is_unmeasured(key: str, mean: Any) -> bool:

@@ -21,8 +21,8 @@ def log(line: str) -> None:
 def result_table(title: str, columns: str, rows: Sequence[Sequence[str]], **how: Any) -> "Table":
     """Return a table of texts.
 
-    columns : their heads, separated by "; "; one that begins with ">" is set to the right, with "*" in bold, with "|"
-              is not broken
+    columns : their heads, separated by "; "; one that begins with ">" is set to the right, with "|" is not broken,
+              with "*" in bold, with "~" in dim letters, with "+" in colour
     how     : of all columns, such as no_wrap=True
     """
     from rich import box
@@ -30,9 +30,10 @@ def result_table(title: str, columns: str, rows: Sequence[Sequence[str]], **how:
 
     table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left")
     for head in columns.split("; "):
-        name = head.lstrip(">*|")
+        name = head.lstrip(">*|~+")
         marks = head.removesuffix(name)
-        own = {"style": "bold" if "*" in marks else None, "no_wrap": "|" in marks}
+        style = next((look for mark, look in (("*", "bold"), ("~", "dim"), ("+", "cyan")) if mark in marks), None)
+        own = {"style": style, "no_wrap": "|" in marks}
         table.add_column(name, justify="right" if ">" in marks else "left", **own | how)
     for row in rows:
         table.add_row(*row)
