@@ -216,6 +216,7 @@ class VerbCommand(TyperCommand):
         about = inspect.getdoc(body) or read_declaration(function).help
         about = about.partition("\nParameters\n---")[0].strip()
         super().__init__(full.rpartition(" ")[2], help=about, rich_help_panel=panel or None, rich_markup_mode="rich")
+        del self.params, self.callback  # read when they are first used
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help, with the formats of files that can be read now."""
@@ -268,23 +269,15 @@ class VerbCommand(TyperCommand):
         if result is not None:
             print_result(result, as_json)
 
-    @property
+    @cached_property
     def params(self) -> list[Any]:
         """Options and arguments, as typer has them."""
         return self._built.params  # type: ignore[no-any-return]
 
-    @params.setter
-    def params(self, _: Any) -> None:
-        pass
-
-    @property
+    @cached_property
     def callback(self) -> Callable[..., Any]:
         """Function that typer calls with what it has read."""
         return self._built.callback  # type: ignore[no-any-return]
-
-    @callback.setter
-    def callback(self, _: Any) -> None:
-        pass
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of a command line."""

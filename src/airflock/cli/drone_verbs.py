@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import typer
 
@@ -221,7 +221,7 @@ def prepare(
 
     where, systems = errors.read(options.parse_position, "--site", site), errors.read(_members, members)
     errors.read(options.check_writable, (out, (".json",)))
-    files = MissionFiles(out, out.with_suffix(".key"), out.with_suffix(".operator"))
+    files = out, out.with_suffix(".key"), out.with_suffix(".operator")
     errors.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
     loaded = options.collect_scenario(errors, scenario, errors.read(options.parse_settings, settings), trust=trust)
     safety = _limits(limit, loaded, errors)
@@ -245,60 +245,34 @@ def prepare(
 
     moved = errors.read(fleets.site_notes, loaded, where, move_field=move_field)
     document = errors.read(card_for, loaded)
-    loads = errors.read(_check_airtimes, systems, document, fast_bits, slow_bits)
+    loads = errors.read(_airtimes, systems, document, fast_bits, slow_bits)
     errors.raise_errors()
     card = _write_mission(files, document, private)
     beside = fleets.deviation_notes(loaded, card.safety, len(card.members))
     terminal.print_notes([*loaded.notes, *fleets.omission_notes(loaded), *beside, *moved])
     if json:
-        radio = {each.radio: each.share for each in loads}
-        terminal.print_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})
+        terminal.print_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": loads})
     else:
         _print_summary(files, card, loads)
 
 
-class MissionFiles(NamedTuple):
-    """Files of a preparation: the card, the mission's key and the operator's key."""
+def _airtimes(systems: list[int], card: dict[str, Any], fast: float, slow: float) -> dict[str, float]:
+    """Return the share of each radio's time that the drones of a card take, from its bit/s and the card's limits.
 
-    card: Path
-    key: Path
-    operator: Path
-
-
-class Airtime(NamedTuple):
-    """Share of a radio's time that a flock takes.
-
-    radio : fast or slow; limit : which of the card's limits sets its rate; share : of the time, 0 to 1
+    Raises CardError where it is too much.
     """
-
-    radio: str
-    limit: str
-    share: float
-
-    def fault(self, count: int) -> str:
-        """Return why so many drones cannot use it, and a remedy."""
-        return (
-            f"{self.radio} radio: {count} drones would take {self.share:.0%} of its time; "
-            f"at most {MAX_AIRTIME_SHARE:.0%}: "
-            f"lower the rate (--limit {self.limit}=...) or raise --{self.radio}-bits"
-        )
-
-
-def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
-    """Return the airtime of `count` drones on the fast and the slow radio, from bit/s and the card's limits."""
-    loads = []
+    shares, errors, count = {}, [], len(systems)
     for radio, limit, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
         packet = PREAMBLE_SECONDS + 8.0 * (DATAGRAM_BYTES + OVERHEAD_BYTES) / bits
-        loads.append(Airtime(radio, limit, count * packet / float(safety[limit])))
-    return loads
-
-
-def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
-    """Return the airtime of the drones of a card. Raises CardError where it is too much."""
-    loads = radio_airtimes(len(systems), document["safety"], fast, slow)
-    if errors := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
+        shares[radio] = share = count * packet / float(card["safety"][limit])
+        if share > MAX_AIRTIME_SHARE:
+            errors.append(
+                f"{radio} radio: {count} drones would take {share:.0%} of its time; at most {MAX_AIRTIME_SHARE:.0%}: "
+                f"lower the rate (--limit {limit}=...) or raise --{radio}-bits"
+            )
+    if errors:
         raise CardError(errors)
-    return loads
+    return shares
 
 
 def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> dict[str, Any]:
@@ -312,29 +286,30 @@ def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> d
     return {} if changed is INVALID else safety
 
 
-def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes) -> Any:
+def _write_mission(files: Sequence[Path], document: dict[str, Any], private: bytes) -> Any:
     """Write card and keys, all of them or none; private: the operator's key. Return the written card."""
     import secrets
 
     try:
-        card = drones.write_card(files.card, document)
-        drones.write_key(files.key, secrets.token_bytes(32))
-        drones.write_key(files.operator, private)
+        card, key, operator = files
+        written = drones.write_card(card, document)
+        drones.write_key(key, secrets.token_bytes(32))
+        drones.write_key(operator, private)
     # All files or none.
     except BaseException:  # a full disk, Ctrl-C: a card without its keys is of no use
         for path in files:
             path.unlink(missing_ok=True)
         raise
-    return card
+    return written
 
 
-def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None:
+def _print_summary(files: Sequence[Path], card: Any, loads: dict[str, float]) -> None:
     """Print the written files, the height limits, and the settings that autopilots need."""
-    terminal.print_message(f"wrote {files.card} (hash {card.hash[:8]}), {files.key}, {files.operator}")
+    terminal.print_message(f"wrote {files[0]} (hash {card.hash[:8]}), {files[1]}, {files[2]}")
     top = card.layer(card.members[-1])
     terminal.print_message(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
-    for load in loads:
-        terminal.print_message(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
+    for radio, share in loads.items():
+        terminal.print_message(f"{radio} radio: {share:.0%} of its time, by an estimate from its bit rate")
     for guard in card.parameter_checks:
         why = guard.reason(card.safety.speed_max, card.safety.response + card.safety.delay)
         terminal.print_message(f"set {guard.instruction()}: {why}")
