@@ -270,12 +270,12 @@ class VerbCommand(TyperCommand):
             print_result(result, as_json)
 
     @cached_property
-    def params(self) -> list[Any]:
+    def params(self) -> list[Any]:  # type: ignore[override]
         """Options and arguments, as typer has them."""
         return self._built.params  # type: ignore[no-any-return]
 
     @cached_property
-    def callback(self) -> Callable[..., Any]:
+    def callback(self) -> Callable[..., Any]:  # type: ignore[override]
         """Function that typer calls with what it has read."""
         return self._built.callback  # type: ignore[no-any-return]
 

@@ -84,10 +84,7 @@ def reading_progress(files: int, quiet: bool) -> Iterator[Callable[[float], None
 def _origin(text: str | None) -> tuple[float, float, float] | None:
     if not text:
         return None
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
+    numbers = options.parse_numbers(text)
     if len(numbers) not in (2, 3) or not (abs(numbers[0]) <= 90.0 and abs(numbers[1]) <= 360.0):
         raise RecordingError(
             f"--origin {text}: write latitude,longitude[,height] in degrees and m, such as 47.48,19.06"
@@ -152,14 +149,10 @@ def identify(o: SimpleNamespace, errors: ErrorCollector) -> None:
 def _span(text: str | None) -> tuple[float, float] | None:
     if not text:
         return None
-    begin, colon, end = text.partition(":")
-    try:
-        span = float(begin or 0.0), float(end)
-    except ValueError as error:
-        raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60") from error
-    if not colon or not 0.0 <= span[0] < span[1]:
+    span = options.parse_numbers(f"0{text}" if text.startswith(":") else text, ":")
+    if len(span) != 2 or not 0.0 <= span[0] < span[1]:
         raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60")
-    return span
+    return span[0], span[1]
 
 
 def _checked(result: Any, flights: int, quiet: bool) -> Any:

@@ -510,10 +510,15 @@ def check_flight_options(device: str, precision: int, scheduler: str | None = No
 
 def parse_position(option: str, text: str) -> tuple[float, float, float]:
     """Parse latitude and longitude (degrees) and altitude (m)."""
+    numbers = parse_numbers(text)
+    if len(numbers) != 3 or not math.isfinite(sum(numbers)):
+        raise ScenarioError([f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120"])
+    return numbers[0], numbers[1], numbers[2]
+
+
+def parse_numbers(text: str, separator: str = ",") -> list[float]:
+    """Parse numbers; return none at all where one of them is not a number."""
     try:
-        latitude, longitude, altitude = (float(part) for part in text.split(","))
-        if not math.isfinite(latitude + longitude + altitude):
-            raise ValueError
-    except ValueError as error:
-        raise ScenarioError([f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120"]) from error
-    return latitude, longitude, altitude
+        return [float(part) for part in text.split(separator)]
+    except ValueError:
+        return []

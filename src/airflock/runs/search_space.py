@@ -8,6 +8,7 @@ scenario could hold such a value.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from graphlib import TopologicalSorter
 from typing import Any
 
 import numpy as np
@@ -127,17 +128,8 @@ def _nest(table: dict[str, Any], key: str, entry: Mapping[str, Any]) -> None:
 def _order(axes: Sequence[SearchAxis]) -> list[int]:
     """Indices of axes, each after the one that it lies above."""
     index = {axis.key: i for i, axis in enumerate(axes)}
-    done: list[int] = []
-
-    def visit(i: int) -> None:
-        if i not in done:
-            if axes[i].above in index:
-                visit(index[axes[i].above])
-            done.append(i)
-
-    for i in range(len(axes)):
-        visit(i)
-    return done
+    below = {i: [index[axis.above]] if axis.above in index else [] for i, axis in enumerate(axes)}
+    return list(TopologicalSorter(below).static_order())
 
 
 def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scenario:

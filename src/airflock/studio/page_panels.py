@@ -125,7 +125,7 @@ class PlaybackPanel(PagePanel):
         )
         self.moment_field = panel.field("moment (s)", "any time already flown; everything after it is discarded")
         panel.row({"Go to this moment": self.ask(self._go)})
-        panel.add_menu("speed", tuple(SPEED_CHOICES), "1 ×", lambda chosen: self._speed(SPEED_CHOICES[chosen]))
+        panel.add_menu("speed", tuple(SPEED_CHOICES), "1 ×", self._speed)
         self.seed = panel.number("seed", player.seed, 0, 2**31, lambda seed: player.ask(lambda: self.reset(seed)))
         most = max(1000, player.flight.agents)
         self.agents = panel.number(
@@ -190,8 +190,8 @@ class PlaybackPanel(PagePanel):
             )
         self.go_back(time)
 
-    def _speed(self, speed: float) -> None:
-        self.player.clock.speed = speed
+    def _speed(self, chosen: str) -> None:
+        self.player.clock.speed = SPEED_CHOICES[chosen]
 
     def go_back(self, time: float | None = None) -> None:
         """Go back to a time, s, or by ten seconds."""
