@@ -291,6 +291,8 @@ def test_functions_report_to_the_logger_that_is_silent_until_somebody_listens(ca
     assert saying >= {"score", "simulate", "sweep", "load_tracks", "fleet"}
     for name in saying - {"watch", "why"}:  # nobody would find the page of one; the other is silent by default
         assert inspect.signature(the(name)).parameters["say"].default is log, name
-    code = "from airflock.support import log; import logging; log('chosen'); logging.basicConfig(level=20); log('heard')"
+    code = (
+        "from airflock.support import log; import logging; log('chosen'); logging.basicConfig(level=20); log('heard')"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "" and done.stderr == "INFO:airflock:heard\n"
