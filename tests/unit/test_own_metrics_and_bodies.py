@@ -2,6 +2,7 @@
 
 import json
 import linecache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -259,3 +260,25 @@ def test_code_that_a_recording_names_does_not_run_with_trust_in_another_file(fil
     assert scenario_of_recording(crafted, {"metrics.kind": "spread.py"}, trust=True).body.rule.name == "multirotor"
     with pytest.raises(AirflockError, match=r"body.kind = 'evil.py', which is not in the file"):
         replay_recording(crafted, settings={"metrics.kind": "spread.py"}, trust=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [
+        ("metrics_of_ones_own", "metrics.kind"),
+        ("body_of_velocities", "body.kind"),
+        ("sensor_of_headings", "sensors.kind"),
+        ("radio_in_the_rain", "radio.kind"),
+        ("topology_of_ones_own", "topology.kind"),
+    ],
+)
+def test_advice_of_a_recording_with_a_part_of_ones_own_flies_it_again(name, key):
+    """A radio and a topology were recorded with their file, so that the advice named rain.py.py."""
+    section, users = key.partition(".")[0], Path(__file__).parents[1] / "users"
+    scenario = airflock.load(users / f"{name}.toml", {"duration": 1.0}, trust=True)
+    recording = airflock.simulate(scenario, seed=2)
+    kind = json.loads(recording.attrs["airflock_scenario"])[section]["kind"]
+    assert kind == Path(scenario.document[section]["kind"]).stem
+    with pytest.raises(AirflockError, match=f"--set {key}={kind}.py --trust"):
+        replay_recording(recording)
+    assert replay_recording(recording, settings={key: str(users / f"{kind}.py")}, trust=True)[0]

@@ -14,7 +14,7 @@ import xarray as xr
 
 from airflock.parts import FAULTS as KINDS
 from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_dataset
-from airflock.scenarios import MODELS
+from airflock.scenarios import MODELS, PART_KINDS
 from airflock.support import RecordingError, as_error, is_number, parse_json_object, shortened
 
 # A file is data from outside: every attribute is read as text and checked, and none of it is
@@ -124,6 +124,14 @@ def user_group_laws(document: Mapping[str, Any]) -> list[str]:
     """Return the names of laws of groups that were the user's own."""
     laws = [law for group in tables_under_key(document, "groups") for law in tables_under_key(group, "model")]
     return [kind for kind in (str(law["kind"]) for law in laws if "kind" in law) if kind not in MODELS]
+
+
+def part_tables(document: Mapping[str, Any]) -> list[Any]:
+    """Return the tables of a scenario whose kind may be a file of the user's own."""
+    sections = ("model", "faults", *(family.section for family in PART_KINDS))
+    tables = [table for section in sections for table in tables_under_key(document, section)]
+    laws = [law for group in tables_under_key(document, "groups") for law in tables_under_key(group, "model")]
+    return tables + laws
 
 
 def tables_under_key(document: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from airflock import __version__
 from airflock.core import radio, random
 from airflock.engine import Flight, driver_text, fly_world, pick_device
-from airflock.recordings.attributes import FAULTS_ATTRIBUTE
+from airflock.recordings.attributes import FAULTS_ATTRIBUTE, part_tables
 from airflock.recordings.dataset import DIMENSIONS, VARIABLE_UNITS, box_sides, make_dataset, nearest_image
 from airflock.scenarios import MODELS, Event, Scenario, check_seed, group_names, law_hash, load_if_named, step_counts
 from airflock.support import FlightError, log, processor_name, toolchain_versions
@@ -168,15 +168,9 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
 def bare_document(scenario: Scenario) -> dict[str, Any]:
     """Return the scenario as plain values; code of the user's own is its bare name, without a file."""
     document: dict[str, Any] = to_plain_values(scenario.document)
-    for section in ("model", "body", "sensors", "metrics"):
-        table = document.get(section, {})
-        kind = table.get("kind") if isinstance(table, dict) else None
-        if isinstance(kind, str) and kind.endswith(".py"):
-            table["kind"] = PurePath(kind).stem
-    tables = [entry["model"] for entry in document.get("groups", ()) if isinstance(entry.get("model"), dict)]
-    for entry in (*document.get("faults", ()), *tables):
-        if str(entry.get("kind", "")).endswith(".py"):
-            entry["kind"] = PurePath(entry["kind"]).stem
+    for table in part_tables(document):
+        if str(table.get("kind", "")).endswith(".py"):
+            table["kind"] = PurePath(table["kind"]).stem
     return document
 
 
