@@ -118,11 +118,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class _Wrong:
-    """Stands for a part that is invalid; nothing is made of it."""
-
-
-INVALID: Any = _Wrong()
+INVALID: Any = object()  # stands for a part that is invalid; nothing is made of it
 
 
 def value_or_default(value: T, default: T) -> T:

@@ -29,18 +29,12 @@ def unavailable_reason() -> str | None:
         return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it is only for tests"
     try:
         if not cuda.is_available():
-            return f"no GPU can be used: {_driver_error()}"
+            return f"no GPU can be used: {_first_line(cuda.cuda_error() or 'no device found')}"
         # A driver may report a device that it then cannot open.
         cuda.get_current_device()
     except Exception as error:  # the driver's own errors come in many types
         return f"the GPU cannot be used: {_first_line(error)}"
     return None
-
-
-def _driver_error() -> str:
-    """Return the driver's own error."""
-    error = cuda_runtime().cuda_error()
-    return _first_line(error) if error else "no device found"
 
 
 def _first_line(error: BaseException | str) -> str:

@@ -416,7 +416,7 @@ def _time(build: CudaBuilder) -> list[str]:
         step += ["counted = integer(1) if n >= least(integer(2), born) else integer(0)"]
     send, world = _send(build), _world(build)
     step += [*send, *world, *_look(build)] if world else _look(build)
-    now_and_then = [*_decide(build), *_watch(build), *_sample(build), *_next(build)]
+    now_and_then = [*_decide(build), *_watch(build), *branch_lines("take", _taken(build)), *_next(build)]
     step += branch_lines("look or step == next_", now_and_then if world else [*send, *now_and_then])
     step += [*branch_lines("step == steps", ["break"]), *_advance(build)]
     # counted by hand in 32 bits: a range counts in 64, twice
@@ -476,17 +476,15 @@ def _watch(build: CudaBuilder) -> list[str]:
     return lines
 
 
-def _sample(build: CudaBuilder) -> list[str]:
-    return branch_lines("take", _taken(build))
-
-
 def _look(build: CudaBuilder) -> list[str]:
     """Lines that decide if pairs are checked for collisions: a vote of all threads, by how far agents have moved."""
     if not stages_of_events(build.plan)["watch"]:
         return []
     watched = _within(build) is not None
     vote = "cuda.syncthreads_or(integer(1) if moved >= gap else integer(0)) != 0" if watched else "True"
-    body = [f"look = {vote}", "next_collide = integer(step + collide_every)", *_counted(build)]
+    body = [f"look = {vote}", "next_collide = integer(step + collide_every)"]
+    # Looks are counted where not every one counts; else their number follows from that of the steps.
+    body += ["count_collision = integer(count_collision + counted)"] * build.plan.absence
     return ["look = False", *branch_lines("step == next_collide", body)]
 
 
@@ -556,8 +554,8 @@ def _looked(build: CudaBuilder) -> list[str]:
 
 def _taken(build: CudaBuilder) -> list[str]:
     """One sample: order parameters and, where they are kept, positions, velocities and commands."""
-    plan = build.plan
-    lines = ["next_sample = integer(step + sample_every)", f"count_sample = integer(count_sample + {_one(build)})"]
+    plan, one = build.plan, "counted" if build.plan.absence else "1"
+    lines = ["next_sample = integer(step + sample_every)", f"count_sample = integer(count_sample + {one})"]
     if stages_of_events(plan)["sample"]:
         lines += [build.stages["measure_sample"].call(), *_added(build, "sample")]
     if plan.record:
@@ -580,16 +578,6 @@ def _added(build: CudaBuilder, clock: str) -> list[str]:
             lines += [add if how in ("mean", "sum") else kept]
     counted = "tid == 0 and counted != 0" if build.plan.absence else "tid == 0"
     return branch_lines(counted, lines) if lines else []
-
-
-def _one(build: CudaBuilder) -> str:
-    """Text of the weight of an instant."""
-    return "counted" if build.plan.absence else "1"
-
-
-def _counted(build: CudaBuilder) -> list[str]:
-    """Looks for collisions are counted where not every one counts; else their number follows from that of the steps."""
-    return ["count_collision = integer(count_collision + counted)"] * build.plan.absence
 
 
 def _number(build: CudaBuilder) -> str:

@@ -213,7 +213,8 @@ def make_arguments(
     own["all_words"] = cuda.device_array((len(jobs), *size["all_words"]), np.uint32)
     own["statuses"] = cuda.to_device(np.full(len(jobs), -1, np.int32))
     own["all_reached"] = cuda.to_device(np.full((len(jobs), *size["all_reached"]), -1.0, real))
-    own["starts"] = cuda.to_device(_stacked(starts, real) if starts is not None else np.zeros((len(jobs), 1, 1), real))
+    places = np.zeros((len(jobs), 1, 1), real) if starts is None else np.stack([np.asarray(s, real) for s in starts])
+    own["starts"] = cuda.to_device(places)
     lanes = size["all_mem"][1]
     beginning = {
         "stores": pair_values(plan, size["stores"][1], size["stores"][2], real),
@@ -287,10 +288,6 @@ def _padded(arrays: Sequence[NDArray[Any]], fill: float = 0.0) -> NDArray[Any]:
     for flock, array in enumerate(arrays):
         found[flock, : len(array)] = array
     return found
-
-
-def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
-    return np.stack([np.ascontiguousarray(start, real) for start in starts])
 
 
 def _wide(own: NDArray[Any], size: tuple[int, ...], real: Any) -> NDArray[Any]:
