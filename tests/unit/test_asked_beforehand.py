@@ -20,7 +20,7 @@ def grounded(monkeypatch):
     def flown(*_, **__):
         raise AssertionError("something was flown")
 
-    for name in ("driver_of", "fly_on_cpu", "advance_in_chunks"):
+    for name in ("driver_of", "fly_on_cpu", "fly_steps"):
         monkeypatch.setattr(cpu, name, flown)
     monkeypatch.setattr(simulate, "run_in_threads", flown)
 

@@ -3,7 +3,7 @@
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,27 +42,15 @@ SIDE_BY_SIDE = 2.5
 BY_CELLS = 40.0  # cores that a GPU stands for with one big flock (100,000 boids)
 
 
-@dataclass(frozen=True)
-class DeviceChoice:
-    """A device, and why `auto` picked it; the reason is empty where it was named."""
-
-    device: str
-    why: str = ""
-
-    @property
-    def note(self) -> str:
-        """One line for a person, empty if there is nothing to say."""
-        return f"device auto: {self.device}, {self.why}" if self.why else ""
-
-
-def choose_device(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> DeviceChoice:
-    """Device for these flights: ScenarioError for an unknown name, DeviceError where a named one cannot fly them.
+def choose_device(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> tuple[str, str]:
+    """Choose a device for these flights; return it and why `auto` picked it, empty where it was named.
 
     plans : one per scenario
+    Raises ScenarioError for an unknown name, DeviceError where a named device cannot fly them.
     """
     check_device(device)
     if device != "cuda" and device != "auto":
-        return DeviceChoice(device)
+        return device, ""
     from airflock.support import require_gpu, unavailable_reason
 
     largest: dict[Plan, Scenario] = {}
@@ -78,22 +66,21 @@ def choose_device(device: str, scenarios: Sequence[Scenario], plans: Sequence[Pl
             raise DeviceError(f"device = cuda: {fault}")
         for fault in filter(None, map(gpu_memory_error, largest.values(), largest)):
             raise DeviceError(f"device = cuda: {fault}; or choose device = cpu")
-        return DeviceChoice(device)
+        return device, ""
     missing = unavailable_reason() or next(filter(None, faults), None)
     if missing is not None:
-        return DeviceChoice("cpu", missing)
+        return "cpu", missing
     seconds = estimated_total_seconds(scenarios) / available_cores()
     if seconds < WORTH:
-        return DeviceChoice("cpu", f"about {seconds:.2g} s of work on {available_cores()} cores")
+        return "cpu", f"about {seconds:.2g} s of work on {available_cores()} cores"
     missing = next(filter(None, map(gpu_memory_error, largest.values(), largest)), None)
     if missing is not None:
-        return DeviceChoice("cpu", missing)
+        return "cpu", missing
     there = seconds_on_gpu(scenarios, plans)
     if there > seconds:
-        return DeviceChoice(
-            "cpu", f"about {seconds:.2g} s of work on {available_cores()} cores, where the GPU would take {there:.2g} s"
-        )
-    return DeviceChoice("cuda", f"about {seconds:.2g} s of work on {available_cores()} cores would be left to the CPU")
+        why = f"about {seconds:.2g} s of work on {available_cores()} cores, where the GPU would take {there:.2g} s"
+        return "cpu", why
+    return "cuda", f"about {seconds:.2g} s of work on {available_cores()} cores would be left to the CPU"
 
 
 def seconds_on_gpu(scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> float:
@@ -285,11 +272,10 @@ def fly_world(
     record: bool = False,
     start: Any = None,
     device: str = "cpu",
-    notify: Callable[[str], None] | None = None,
 ) -> cpu.DriverResult:
     """Fly one world. Raises FlightError where agents find no room or a state stops being finite.
 
-    device : cpu, cuda, python (no compiler, double precision), or auto, which passes its pick to `notify`
+    device : cpu, cuda, python (no compiler, double precision), or auto
     """
     seed = check_seed(seed)
     scenario = scenario.with_drawn_scene(seed)
@@ -297,7 +283,7 @@ def fly_world(
     if start is not None:
         plan = plan.built(given_start=True)
         start = check_start(scenario, plan, start)
-    chosen = device if device == "cpu" else _choice(device, [scenario], [plan], notify)
+    chosen = choose_device(device, [scenario], [plan])[0]
     if chosen != "cuda":
         check_resources(scenario, plan)
     flown = fly_one(scenario, plan, seed, chosen, start)
@@ -316,16 +302,10 @@ def pick_device(
     if device == "cpu":
         return device
     plans = [plan_of(scenario, precision=precision, record=record) for scenario in scenarios]
-    return _choice(device, scenarios, plans, notify)
-
-
-def _choice(
-    device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan], say: Callable[[str], None] | None
-) -> str:
-    choice = choose_device(device, scenarios, plans)
-    if say is not None and choice.note:
-        say(choice.note)
-    return choice.device
+    chosen, why = choose_device(device, scenarios, plans)
+    if notify is not None and why:
+        notify(f"device auto: {chosen}, {why}")
+    return chosen
 
 
 def check_result(
@@ -344,8 +324,6 @@ def check_result(
 
 def _first_bad(flown: cpu.DriverResult) -> int | None:
     """First agent whose state is not finite."""
-    import numpy as np
-
     bad = np.flatnonzero(~np.isfinite(flown.state).all(axis=0) & flown.present)
     return int(bad[0]) if bad.size else None
 
@@ -405,8 +383,6 @@ def check_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
 
     Raises FlightError, one line, where their shape, their kind or their values are wrong.
     """
-    import numpy as np
-
     names = plan.motion
     shape, said = (len(names), scenario.agents), f"{scenario.name}: start: "
     try:
@@ -445,16 +421,15 @@ def score_flights(
     precision: int = 32,
     on_done: Callable[[], None] | None = None,
     device: str = "cpu",
-    notify: Callable[[str], None] | None = None,
 ) -> list[dict[str, float]]:
     """Order parameters of many flights, flight i with seeds[i]; side by side on all cores, or together on a GPU.
 
-    device : cpu, cuda, python (no compiler, double precision), or auto, which passes its pick to `notify`
+    device : cpu, cuda, python (no compiler, double precision), or auto
     """
     seeds = [check_seed(seed) for seed in seeds]
     if device != "cpu":
         plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
-        device = _choice(device, scenarios, plans, notify)
+        device = choose_device(device, scenarios, plans)[0]
         if device == "cuda":
             flown = fly_on_gpu(scenarios, plans, seeds, None, on_done)
             together = zip(scenarios, seeds, flown, strict=True)

@@ -42,16 +42,7 @@ def fly_on_cpu(plan: Plan, tables: WorldTables, start: NDArray[Any] | None = Non
     start : (component, agent), m and m/s, where the plan asks for it
     """
     state = DriverState(plan, tables, driver_of(plan, device), start)
-    steps, every = state.whole("steps"), state.whole("sample_every")
-    frames = (
-        np.full((steps // every + 1, 3 * plan.dimensions, state.agents), np.nan, tables.row.dtype)
-        if plan.record
-        else None
-    )
-    with compile_messages(state.driver, plan.model.name):
-        status = advance_in_chunks(state, 0, steps + 1, frames)
-    if frames is not None and state.has_ended:
-        frames = frames[: -(-status // every)]
+    status, frames = fly_steps(state, 0, state.whole("steps") + 1, plan.record)
     return DriverResult(state.values(), frames, state.motion, min(status, 0), ~state.present if plan.absence else None)
 
 
@@ -59,23 +50,31 @@ BEAT = 0.1  # s; about how long a compiled call flies until Ctrl-C and the like 
 FIRST = 200_000  # agents times steps of the first of them; some 10 ms
 
 
-def advance_in_chunks(
-    state: DriverState, first: int, last: int, frames: NDArray[Any] | None = None, half: int = 0
-) -> int:
+def fly_steps(
+    state: DriverState, first: int, last: int, record: bool, half: int = 0
+) -> tuple[int, NDArray[Any] | None]:
     """Fly the steps first to last - 1 in parts of about BEAT, between which an interruption is heard.
 
-    frames : (sample, component, agent) for all samples of these steps, or None
-    Returns the next step, or minus the first agent (from 1) that found no place.
+    Returns the next step, or minus the first agent (from 1) that found no place; and, if they are to be recorded, the
+    samples of these steps: (sample, component, agent).
     """
     steps, step, every = max(1, FIRST // state.agents), first, state.whole("sample_every")
-    skipped = -(-first // every)
-    while step < last and not state.has_ended:
-        check_interrupted()
-        part, begun = min(step + steps, last), time.monotonic()
-        rest = None if frames is None else frames[-(-step // every) - skipped :]
-        done = state.advance(step, part, half, rest)
-        if done < 0:
-            return done
-        step, half = done, 0
-        steps = max(1, int(steps * min(8.0, BEAT / max(time.monotonic() - begun, 1e-6))))
-    return step
+    # Samples from `first` on and before `last`: both ends are rounded up, so that no cut of a
+    # flight counts one twice.
+    skipped, frames = -(-first // every), None
+    if record:
+        shape = (-(-last // every) - skipped, 3 * state.plan.dimensions, state.agents)
+        frames = np.full(shape, np.nan, state.tables.row.dtype)
+    with compile_messages(state.driver.advance, state.plan.model.name):
+        while step < last and not state.has_ended:
+            check_interrupted()
+            part, begun = min(step + steps, last), time.monotonic()
+            rest = None if frames is None else frames[-(-step // every) - skipped :]
+            done = state.advance(step, part, half, rest)
+            if done < 0:
+                return done, frames
+            step, half = done, 0
+            steps = max(1, int(steps * min(8.0, BEAT / max(time.monotonic() - begun, 1e-6))))
+    if frames is not None and state.has_ended:
+        frames = frames[: -(-step // every) - skipped]
+    return step, frames

@@ -31,8 +31,8 @@ from airflock.world import FAR_AWAY
 AGENTS, RING = INTEGER_NAMES.index("agents"), INTEGER_NAMES.index("ring")
 
 
-class DriverMemory:
-    """Memory of one flight, and the driver that reads and writes it.
+class DriverState:
+    """Memory of one flight, and the driver that reads and writes it, step by step.
 
     plan, driver : what is fixed at compile time, and the functions that were made of it
     tables       : what stands in the world and does not change; numbers that may change were copied from it
@@ -218,15 +218,11 @@ class DriverMemory:
             found[:, self.here :] = np.nan
         return found if (slot := self.slots) is None else found[:, slot]
 
-
-class DriverState(DriverMemory):
-    """A flight as its driver flies it, step by step."""
-
     def compile(self) -> "DriverState":
         """Have the driver compiled; nothing is flown, and agents get no places. Returns the state."""
         marks = self.arrays["held"]
         begun, marks[BEGUN] = marks[BEGUN], 1.0
-        with compile_messages(self.driver, self.plan.model.name):
+        with compile_messages(self.driver.advance, self.plan.model.name):
             self.advance(0, 0)
         marks[BEGUN] = begun
         return self
@@ -275,48 +271,27 @@ class DriverState(DriverMemory):
         It stops on the way where a fault is due. What is due at a step is done before it is flown
         or sensed.
         """
-        due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last}) if self.tables.due else []
-        if not due:
-            return self._watched(first, last, half, frames)
-        step, skipped, every = first, -(-first // self.whole("sample_every")), self.whole("sample_every")
-        for stop in [*(step for step in due if step > first or not half & 1), last]:
-            if step < stop or stop == last:
-                rest = None if frames is None else frames[-(-step // every) - skipped :]
-                done = self._watched(step, stop, half, rest)
-                if done != stop or stop == last:
-                    return done
-                step, half = stop, 0
-            self._strike(stop)
-        return step
-
-    def _strike(self, step: int) -> None:
-        """Let begin what is due before a step."""
-        if not self.begun and self._fly(step, step, 0, None) < 0:
-            return  # said when the step is flown
-        for onset in self.tables.due:
-            if onset.step == step and onset.leaves:
-                remove_agents(self, [onset.agent] if still_has_fault(self, onset) else [])
-            elif onset.step == step:
-                begin_fault(self, onset)
-
-    def _watched(self, first: int, last: int, half: int, frames: NDArray[Any] | None) -> int:
-        """Fly some steps; who has come to the ground with an empty battery is put away before the next one."""
-        landing, every = self.tables.ground_contact, self.whole("sample_every")
-        if landing is None or first == last:
-            return self._fly(first, last, half, frames)
-        if not self.begun and (unplaced := self._fly(first, first, 0, None)) < 0:
+        due = {onset.step for onset in self.tables.due if first <= onset.step < last}
+        landing, every = self.tables.ground_contact if first < last else None, self.whole("sample_every")
+        if (due or landing) and not self.begun and (unplaced := self._fly(first, first, 0, None)) < 0:
             return unplaced
         step, skipped = first, -(-first // every)
-        while step < last:
+        while True:
             if step > first or not half & 1:  # else that was done before this step was sensed
-                landing.land(self)
-            stop = min(last, step + landing.steps_without_landing(self))
+                for onset in self.tables.due if step in due else ():
+                    if onset.step == step and not onset.leaves:
+                        begin_fault(self, onset)
+                    elif onset.step == step and still_has_fault(self, onset):
+                        remove_agents(self, [onset.agent])
+                if landing:  # who has come to the ground with an empty battery is put away
+                    landing.land(self)
+            stop = min([last, *(coming for coming in due if coming > step)])
+            stop = min(stop, step + landing.steps_without_landing(self)) if landing else stop
             rest = None if frames is None else frames[-(-step // every) - skipped :]
-            done = self._fly(step, stop, half, rest)
-            if done != stop:
+            done = self._fly(step, stop, half if step == first else 0, rest)
+            if done != stop or stop == last:
                 return done
-            step, half = stop, 0
-        return step
+            step = stop
 
     def _fly(self, first: int, last: int, half: int, frames: NDArray[Any] | None) -> int:
         """One call of the driver. An instant with fewer than two of several agents is not counted."""

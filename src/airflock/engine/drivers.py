@@ -90,12 +90,7 @@ def is_compiled(driver: ModuleType) -> bool:
     return is_loaded(driver) or any(Path(driver.advance.stats.cache_path).glob("*.nbi"))
 
 
-def compile_messages(driver: ModuleType, model: str) -> AbstractContextManager[None]:
-    """Around calls of a driver: `rule_errors_of_compiler`, if it has to be compiled first."""
-    return function_compile_messages(driver.advance, model)
-
-
-def function_compile_messages(function: Any, model: str) -> AbstractContextManager[None]:
+def compile_messages(function: Any, model: str) -> AbstractContextManager[None]:
     """Around calls of a function of a driver: `rule_errors_of_compiler`, if it has to be compiled first."""
     return nullcontext() if getattr(function, "overloads", True) else rule_errors_of_compiler(model)
 

@@ -152,7 +152,7 @@ class FlightState:
 
     def call(self, first: int, last: int, half: int = 0) -> None:
         """One call of the driver, for what is not a part of the flight itself."""
-        with compile_messages(self.state.driver, self.scenario.model.name):
+        with compile_messages(self.state.driver.advance, self.scenario.model.name):
             self._placed(self.state.advance(first, last, half))
 
     @property
@@ -172,18 +172,10 @@ class FlightState:
         self.apply_pending_change()
         if last <= self.step:
             return
-        state, first, every = self.state, self.step, self.state.whole("sample_every")
-        frames = None
-        if self.record:
-            # Samples from `first` on and before `last`: both ends are rounded up, so that no cut of
-            # a flight counts one twice.
-            count = -(-last // every) - -(-first // every)
-            frames = np.full((count, 3 * state.plan.dimensions, state.agents), np.nan, state.tables.row.dtype)
-        with compile_messages(state.driver, self.scenario.model.name):
-            done = self._placed(cpu.advance_in_chunks(state, first, last, frames, 1 if self.has_sensed else 0))
-        self.step, self.has_sensed = done, False
+        first, every = self.step, self.state.whole("sample_every")
+        done, frames = cpu.fly_steps(self.state, first, last, self.record, 1 if self.has_sensed else 0)
+        self.step, self.has_sensed = self._placed(done), False
         if frames is not None:
-            frames = frames[: -(-done // every) - -(-first // every)] if state.has_ended else frames
             self._frames.append(frames)
             self._sampled.append((-(-first // every) + np.arange(len(frames))) * every * self.scenario.flight.dt)
 

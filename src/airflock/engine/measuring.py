@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from airflock.engine import interpreted
 from airflock.engine.driver_state import DriverState
-from airflock.engine.drivers import function_compile_messages
+from airflock.engine.drivers import compile_messages
 from airflock.engine.passes.build import sampled_columns
 from airflock.engine.passes.driver import replay
 from airflock.engine.plan import Plan, plan_of
@@ -68,7 +68,7 @@ def score_tables(
     series = np.full((frames.shape[0], len(own["values"])), np.nan)
 
     def measure(first: int, part: NDArray[Any]) -> None:
-        with function_compile_messages(driver.measure_frames, plan.model.name):
+        with compile_messages(driver.measure_frames, plan.model.name):
             driver.measure_frames(
                 first, tables.row, own["whole"], tables.edges, tables.spans, state.scene, own["work"], own["memory"],
                 own["labels"], own["values"], own["sums"], np.ascontiguousarray(part, real), series, real.type(period),
