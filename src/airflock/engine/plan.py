@@ -458,7 +458,7 @@ def _own_text(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> Hashabl
 def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> Plan:
     """The plan itself."""
     _probe_rules(scenario)
-    laws, world = scenario.laws, scenario.world
+    laws, world, wind, goal = scenario.laws, scenario.world, scenario.wind, scenario.goals.kind
     surfaces, beyond = arena_surfaces(world)
     return Plan(
         model=scenario.model,
@@ -486,8 +486,24 @@ def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> Plan:
         laws=tuple(GroupLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
         uses_groups=bool(scenario.groups) and any(law.uses_groups for law in laws),
         **_sensing(scenario),
-        **_hearing(scenario),
-        **_surroundings(scenario),
+        radio=scenario.radio.rule,
+        # the kind of radios that share a record is none of the choices that rules can read
+        radio_choices=tuple(pair for pair in _chosen(scenario.radio.numbers) if pair[0] != "kind"),
+        few=_few_packets(scenario),
+        delayed=step_counts(scenario)["delay"] > 0,
+        lossy=scenario.radio.loss > 0.0,
+        stops_for_lost=scenario.silence.rule == "stop",
+        topology=scenario.topology.rule if any(law.model.neighbour is not None for law in scenario.laws) else None,
+        fading=scenario.own_topology is not None or scenario.topology.fading > 0.0,
+        start=scenario.start.kind,
+        scene=scenario.has_scene,
+        spheres=scenario.scene.kind == "boxes" and bool(scenario.scene.spheres),
+        has_mesh=scenario.scene.kind == "mesh",
+        goals=goal in ("points", "scene"),
+        is_shepherd=goal in ("points", "scene") and scenario.goals.role == "herd",
+        own=goal == "own",
+        windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
+        dryden=wind.kind == "dryden",
     )
 
 
@@ -508,37 +524,6 @@ def _probe_rules(scenario: Scenario) -> None:
 def _chosen(record: Any) -> tuple[tuple[str, str], ...]:
     """Choices of a record, in the order of their names."""
     return tuple(sorted(choices(record).items()))
-
-
-def _surroundings(scenario: Scenario) -> dict[str, Any]:
-    """Return the properties of a plan that describe start, scene, goals and wind."""
-    kind, wind = scenario.goals.kind, scenario.wind
-    return {
-        "start": scenario.start.kind,
-        "scene": scenario.has_scene,
-        "spheres": scenario.scene.kind == "boxes" and bool(scenario.scene.spheres),
-        "has_mesh": scenario.scene.kind == "mesh",
-        "goals": kind in ("points", "scene"),
-        "is_shepherd": kind in ("points", "scene") and scenario.goals.role == "herd",
-        "own": kind == "own",
-        "windy": wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
-        "dryden": wind.kind == "dryden",
-    }
-
-
-def _hearing(scenario: Scenario) -> dict[str, Any]:
-    """Return the properties of a plan that describe the radio and the topology."""
-    return {
-        "radio": scenario.radio.rule,
-        # the kind of radios that share a record is none of the choices that rules can read
-        "radio_choices": tuple(pair for pair in _chosen(scenario.radio.numbers) if pair[0] != "kind"),
-        "few": _few_packets(scenario),
-        "delayed": step_counts(scenario)["delay"] > 0,
-        "lossy": scenario.radio.loss > 0.0,
-        "stops_for_lost": scenario.silence.rule == "stop",
-        "topology": scenario.topology.rule if any(law.model.neighbour is not None for law in scenario.laws) else None,
-        "fading": scenario.own_topology is not None or scenario.topology.fading > 0.0,
-    }
 
 
 def _sensing(scenario: Scenario) -> dict[str, Any]:
