@@ -1,6 +1,5 @@
 """Verbs run, score, sweep, plot, video, replay, display and watch: fly a scenario, and look at flights."""
 
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -216,7 +215,7 @@ def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> Non
             terminal.print_message(f"{each.path}: {note}")
 
 
-MAX_GRID_POINTS = 100_000  # of one key, and points of a whole grid
+MAX_GRID_POINTS = 100_000  # of one key
 
 
 @verb(PANEL, "airflock.sweep", "settings law trust agents duration SEEDS FLYING json table plot show")
@@ -266,14 +265,6 @@ def _axes(over: list[str], plot: Path | None, errors: ErrorCollector) -> dict[st
     """Return the swept keys with their values; unreadable ones are noted as errors."""
     axes = [found for text in over if (found := errors.read(parse_axis, text)) is not INVALID]
     errors.read(check_distinct_keys, [text.partition("=")[0].strip() for text in over], plot)
-    return errors.read(_bounded, axes)
-
-
-def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
-    """Return the axes of a grid that is not too large."""
-    size = math.prod(len(values) for _, values in axes)
-    if size > MAX_GRID_POINTS:
-        raise ScenarioError([f"--over: a grid of {size} points is more than {MAX_GRID_POINTS}"])
     return dict(axes)
 
 

@@ -39,20 +39,12 @@ COMPLETION_VARIABLE = "_AIRFLOCK_COMPLETE"  # of the environment, in which a she
 class VerbGroup(GroupOfVerbs):
     """Group of the verbs; a wrong command line and Ctrl-C end like any other error, with one line and status 2."""
 
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        windows_expand_args: bool = True,
-        **extra: Any,
-    ) -> Any:
+    def main(self, args: Sequence[str] | None = None, *, standalone_mode: bool = True, **how: Any) -> Any:  # type: ignore[override]
         """Run a command line; raise an AirflockError where it is wrong."""
         completion_init()  # typer's own classes for shells, which its scripts expect
         words = [expand_home(word) for word in (sys.argv[1:] if args is None else args)]
         try:
-            result = super().main(words, prog_name, COMPLETION_VARIABLE, False, windows_expand_args, **extra)
+            result = super().main(words, standalone_mode=False, **how | {"complete_var": COMPLETION_VARIABLE})
         except typer.Abort as stop:
             raise AirflockError("interrupted") from stop
         except Exception as error:

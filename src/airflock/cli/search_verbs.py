@@ -166,8 +166,8 @@ def tune(o: SimpleNamespace, errors: ErrorCollector) -> None:
     if o.scenario or not o.resume:
         place = errors.read(_start_scenario, o.scenario or [], o.like, o.heard)
         base = options.collect_scenario(errors, place, settings, trust=o.trust)
-        start = errors.read(_tuned_scenario, base, o.like)
-        # With logs the plan depends on their contents.
+        # With logs the start is not known yet, but takes the same limits; the plan depends on their contents.
+        start = base if o.like is not None else errors.read(lambda found: search.prepare_start(found)[0], base)
         plan = errors.read(search.load_plan, folder, start, o.resume) if o.like is None else None
         errors.read(search.make_request, start, limits, o.confidence, value_or_default(plan, None))
         errors.raise_errors()
@@ -202,11 +202,6 @@ def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -
     if Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
         raise ScenarioError([f"{scenario[0]}: is not a scenario file (.toml); with logs, give --like PRESET"])
     return scenario[0]
-
-
-def _tuned_scenario(base: Any, like: str | None) -> Any:
-    """Return the scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
-    return base if like is not None else search.prepare_start(base)[0]
 
 
 def _print_tuned(tuning: Any, shown: list[str], as_json: bool = False) -> None:
