@@ -128,7 +128,7 @@ def test_stages_are_the_trees_on_record(name):
 CHANGES = (
     (receive, "real(decision), rate", "real(decision + 1), rate", "links"),
     (pair, "return integer(q) != me.ii", "return integer(q) == me.ii", "quiet"),
-    (pair, "if plan.periodic:", "if plan.delayed:", "quiet"),
+    (pair, "if flight.plan.periodic:", "if flight.plan.delayed:", "quiet"),
     (surfaces, "flock.walls[c][i] += t[c]", "flock.walls[c][i] += t[0]", "polygon"),
     (move, "x[a][i] += v[a][i] * numbers.c.dt", "x[a][i] += v[a][i] * numbers.c.period", "quiet"),
     (perceive, "place[i] = x[i] + q[i]", "place[i] = x[i] + u[i]", "3-D"),
