@@ -1,60 +1,88 @@
-"""A Gymnasium environment: a policy flies one drone of a flock, the others fly their law. `pip install gymnasium`.
+"""Learn to flock: a small network, the same for all drones, trained by CMA-ES. `pip install 'airflock[learn]'`.
 
-Observation: own velocity, then offset and velocity of the nearest five whom it hears (m, m/s; else zeros). Action: the
-velocity that it wants, in parts of FASTEST. Reward: -1 to 1 for flying as the flock does, -10 nearer than `r_coll`.
+Each candidate flies two flights of one vector environment, all candidates at once. What an agent observes becomes ten
+numbers in axes along and to the left of its velocity; the network answers with the velocity that it wants.
 """
 
-import gymnasium
+import sys
+
+import cma
 import numpy as np
 
-import airflock
+import airflock.learn
 
-NEAREST, FASTEST = 5, 8.0  # drones; m/s
+SCENARIO = {"agents": 10, "duration": 60.0, "world.side": 120.0}
+SPEED, FASTEST, LENGTH = 4.0, 6.0, 40.0  # m/s; m/s; m
+HIDDEN, INPUTS = 8, 10
+SIZE = HIDDEN * INPUTS + 2 * (HIDDEN + 1)
+AHEAD = np.eye(SIZE)[-2]  # the search begins here: all fly on at SPEED
+EAST_NORTH = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])  # of every second ray of eight
 
 
-class FlockMember(gymnasium.Env):
-    """Drone 0 of a scenario in a plane whose law commands a velocity."""
+def inputs(parts):
+    """Inputs of each agent, and the rotation into its axes; parts: `Percepts`, (flight, agent, ...).
 
-    def __init__(self, scenario="vasarhelyi_2018/4ms", settings=None):
-        self.scenario = airflock.load(scenario, settings)
-        self.period = self.scenario.sensors.period  # s between two decisions
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2 + 4 * NEAREST,), np.float32)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+    Its speed; means of offsets and of relative velocities, a push from the near, one from near walls; and 1.
+    """
+    speed = np.linalg.norm(parts.velocity, axis=-1, keepdims=True)
+    along = np.where(speed > 1e-3, parts.velocity / np.maximum(speed, 1e-3), EAST_NORTH[0])
+    turn = np.stack([along, along[..., ::-1] * [-1.0, 1.0]], axis=-2)  # rows: along, to the left
+    square = (parts.offset**2).sum(axis=-1)
+    near = (parts.heard * (square <= LENGTH**2))[..., None]
+    count = np.maximum(near.sum(axis=-2), 1.0)
+    vectors = [
+        (near * parts.offset).sum(axis=-2) / count / LENGTH,
+        -LENGTH * (near * parts.offset / np.maximum(square, 1e-6)[..., None]).sum(axis=-2),
+        (near * parts.closing).sum(axis=-2) / count / SPEED,
+        -np.maximum(1.0 - parts.free[..., ::2] / LENGTH, 0.0) @ EAST_NORTH,
+    ]
+    own = [np.einsum("...ij,...j->...i", turn, vector) for vector in vectors]
+    return np.concatenate([speed / SPEED, *own, np.ones_like(speed)], axis=-1), turn
 
-    def reset(self, *, seed=None, options=None):
-        """Begin a flight anew; the same seed is the same flight to the bit."""
-        super().reset(seed=seed)
-        self.flight = airflock.open(self.scenario, seed=int(self.np_random.integers(2**32)))
-        return self._perceived(), {}
 
-    def step(self, action):
-        """Overrule the drone's own law until its next decision."""
-        self.flight.sense().command(0, FASTEST * np.asarray(action, float)).advance(self.period)
-        x, v = np.split(self.flight.state.astype(float), 2)
-        apart = np.linalg.norm(x[:, 1:] - x[:, :1], axis=0).min()
-        hit = bool(apart < self.scenario.metrics.r_coll)
-        mean = v[:, 1:].mean(axis=1)
-        along = float(v[:, 0] @ mean / max(np.linalg.norm(v[:, 0]) * np.linalg.norm(mean), 1e-9))
-        return self._perceived(), -10.0 if hit else along, hit, self.flight.over, {"apart": apart}
+def layers(weights):
+    """The two layers of each network, (flight, input, output); the last input of each is 1."""
+    first = weights[:, : HIDDEN * INPUTS].reshape(-1, INPUTS, HIDDEN)
+    return first, weights[:, HIDDEN * INPUTS :].reshape(-1, HIDDEN + 1, 2)
 
-    def _perceived(self):
-        view = self.flight.look(0)
-        own, others = view.own, [heard.state for heard in view.heard]
-        rows = [[s.x - own.x, s.y - own.y, s.vx - own.vx, s.vy - own.vy] for s in others]
-        near = sorted(rows, key=lambda row: np.hypot(row[0], row[1]))[:NEAREST]
-        seen = np.zeros(2 + 4 * NEAREST, np.float32)
-        seen[:2], seen[2 : 2 + 4 * len(near)] = (own.vx, own.vy), np.ravel(near)
-        return seen
+
+def act(weights, parts):
+    """Commands of all agents, (flight, agent, axis), by the weights of each flight, (flight, SIZE)."""
+    seen, turn = inputs(parts)
+    first, last = layers(weights)
+    wanted = SPEED * (np.tanh(seen @ first) @ last[:, :-1] + last[:, None, -1])
+    wanted *= np.minimum(1.0, FASTEST / np.maximum(np.linalg.norm(wanted, axis=-1, keepdims=True), 1e-6))
+    return np.einsum("...ij,...i->...j", turn, wanted)  # back to east and north
+
+
+def fly(envs, weights, seed):
+    """Fitness of one episode of each flight."""
+    _, info = envs.reset(seed=seed)
+    over = np.zeros(1, bool)
+    while not over.all():
+        actions = act(weights, envs.episodes.flights.percepts)
+        _, _, ended, cut, info = envs.step(actions.astype(np.float32))
+        over = ended | cut
+    return info["fitness"]
+
+
+def train(seed=1, generations=30, candidates=16, flights=2):
+    """Return the weights that CMA-ES ends with."""
+    envs = airflock.learn.make_vec("vasarhelyi_2018/4ms", candidates * flights, settings=SCENARIO)
+    search = cma.CMAEvolutionStrategy(AHEAD, 0.5, {"popsize": candidates, "seed": seed, "verbose": -9})
+    for generation in range(generations):
+        found = np.array(search.ask())
+        fitness = fly(envs, np.repeat(found, flights, axis=0), 1000 * generation).reshape(-1, flights).mean(axis=1)
+        search.tell(found, -fitness)
+        if generation % 10 == 9:
+            print(f"generation {generation + 1}: mean fitness {fitness.mean():.3f}, best {fitness.max():.3f}")
+    return search.result.xfavorite
 
 
 if __name__ == "__main__":
-    env = FlockMember(settings={"agents": 20, "duration": 20.0, "world.side": 120.0})
-    env.reset(seed=1)
-    env.action_space.seed(1)
-    rewards, hit, over = [], False, False
-    while not hit and not over:
-        _, reward, hit, over, _ = env.step(env.action_space.sample())
-        rewards.append(reward)
-    print(
-        f"random actions: mean reward {np.mean(rewards):.3f}; the flock: phi_vel {env.flight.scores()['phi_vel']:.3f}"
-    )
+    best = train(generations=int(sys.argv[1]) if len(sys.argv) > 1 else 30)
+    tests = airflock.learn.make_vec("vasarhelyi_2018/4ms", 10, settings=SCENARIO)
+    draws = np.random.default_rng(1).normal(AHEAD, 0.5, (10, SIZE))
+    for name, weights in {"random": draws, "trained": np.tile(best, (10, 1))}.items():
+        print(f"{name}: fitness of ten new flights {np.round(fly(tests, weights, 10**6), 3)}")
+    print(f"the first of them: phi_vel {tests.episodes.flights.scores(0)['phi_vel']:.2f} m/s")

@@ -23,7 +23,7 @@ from .core.parameters import (
 from .core.radio import radio as radio
 from .core.sensor import sensor as sensor
 from .displays.shows import display as display
-from .engine import Flight as Flight, print_law as print_law
+from .engine import Flight as Flight, open_many as open_many, print_law as print_law
 from .estimate.identification.vehicle_identification import identify as identify
 from .estimate.inference.law_inference import infer as infer
 from .fleets.flying import fleet as fleet

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,8 +20,16 @@ from reference.flight import fly_plainly
 ROOT = Path(__file__).parents[2]
 NEEDS = {"gym_env": "gymnasium", "real_fish": "trajectorytools"}  # examples that need what we do not install
 
+LONG = {"gym_env"}  # examples that take minutes
 
-@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.nightly] * (path.stem in LONG))
+        for path in sorted((ROOT / "examples").glob("*.py"))
+    ],
+)
 def test_example_runs(path, tmp_path):
     if path.stem in NEEDS:
         pytest.importorskip(NEEDS[path.stem])
@@ -64,21 +73,35 @@ def test_own_rule_flies_the_same_in_plain_python(seed):
     np.testing.assert_allclose(text.frames, known.frames, atol=1e-9)
 
 
-def test_the_environment_of_reinforcement_learning_keeps_the_rules_of_gymnasium(monkeypatch, seed):
-    checker = pytest.importorskip("gymnasium.utils.env_checker")
+@pytest.fixture
+def gym_env(monkeypatch):
+    """The example that learns to flock."""
+    pytest.importorskip("gymnasium")
     monkeypatch.syspath_prepend(ROOT / "examples")
     import gym_env
 
-    small = {"agents": 12, "duration": 4.0, "world.side": 120.0}
-    checker.check_env(gym_env.FlockMember(settings=small), skip_render_check=True)
-    env = gym_env.FlockMember(settings=small)
-    seen, _ = env.reset(seed=seed)
-    assert seen[:2] == pytest.approx(0.0, abs=2.0)  # at rest, but for the error of its receiver
-    for count in range(1, 21):
-        seen, _, hit, over, _ = env.step(np.array([0.5, -0.25]))
-        assert not hit and over == (count == 20)
-    east, north = env.flight.state[2:, 0]  # 4 s of a body that relaxes within 1 s to what was commanded
-    assert (east, north) == pytest.approx((4.0, -2.0), abs=0.8) and (seen[2:] != 0.0).any()
+    return gym_env
+
+
+def test_the_network_of_the_example_turns_with_the_world(gym_env, seed):
+    rng = np.random.default_rng(seed)
+    draw = {"velocity": (3, 5, 2), "offset": (3, 5, 7, 2), "closing": (3, 5, 7, 2), "free": (3, 5, 8)}
+    seen = {name: rng.normal(0.0, 10.0, shape) for name, shape in draw.items()}
+    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])  # a turn of 90 degrees moves two of eight rays
+    turned = {name: np.roll(a, 2, axis=-1) if name == "free" else a @ quarter.T for name, a in seen.items()}
+    heard, weights = np.ones((3, 5, 7)), rng.normal(0.0, 0.5, (3, gym_env.SIZE))
+    one, other = (gym_env.act(weights, SimpleNamespace(**a, heard=heard)) for a in (seen, turned))
+    assert other == pytest.approx(one @ quarter.T, abs=1e-9) and np.abs(one).max() > 0.1
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", range(1, 11))
+def test_what_the_example_has_learnt_beats_random_networks(gym_env, seed):
+    best = gym_env.train(seed=seed)
+    envs = gym_env.airflock.learn.make_vec("vasarhelyi_2018/4ms", 10, settings=gym_env.SCENARIO)
+    draws = np.random.default_rng(seed).normal(gym_env.AHEAD, 0.5, (10, gym_env.SIZE))
+    learnt, random = (gym_env.fly(envs, np.broadcast_to(w, draws.shape), 10**6).mean() for w in (best, draws))
+    assert learnt > random + 0.1
 
 
 def test_scenario_file_of_the_start_page_is_valid(tmp_path):

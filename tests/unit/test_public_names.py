@@ -31,6 +31,7 @@ UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "
 # public functions that no command is: they are what a program does between two of them
 LIBRARY_FUNCTIONS = {
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "presets", "model",
+    "open_many",
     "body", "fault", "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric",
     "check_sensor", "check_radio", "check_topology", "check_fault", "print_law", "quantity", "choice",
     "why",

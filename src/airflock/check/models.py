@@ -38,7 +38,7 @@ from airflock.core import (
     sum_neighbours,
     sum_surfaces,
 )
-from airflock.engine import fly_world, plan_of, scratch_shapes
+from airflock.engine import fly_world, plan_of
 from airflock.scenarios import CallerParts, Scenario, build_scenario, check_seed, find_law, settings_dict
 from airflock.support import AirflockError
 
@@ -58,7 +58,7 @@ def flock_solver(scenario: Scenario) -> FlockSolver | None:
     if model.flock is None or model.workspace is None:
         return None
     given = {"p": scenario.parameters, "wing": scenario.wing, "aero": scenario.aero}
-    shapes = scratch_shapes(model.workspace, scenario.agents, given)
+    shapes = call_rule(model.workspace, "flock", given | {"n": scenario.agents}, model.name)
     return rule_solver(model.flock, "flock", model.Shared, shapes, given, model.name)
 
 

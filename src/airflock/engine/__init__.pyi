@@ -10,8 +10,7 @@ from .closed_flights import (
 )
 from .driver_state import DriverState as DriverState
 from .drivers import load_loops as load_loops
-from .flight import Flight as Flight, Snapshot as Snapshot
+from .flight import Flight as Flight, Snapshot as Snapshot, open_many as open_many
 from .measuring import measure_frames as measure_frames
 from .plan import Plan as Plan, plan_of as plan_of
 from .text.generate import DriverSource as DriverSource
-from .text.probe import scratch_shapes as scratch_shapes

@@ -174,6 +174,7 @@ def fly_on_gpu(
 # counted: rows, past states that a delay needs, a packet of each pair where the radio keeps them,
 # the grid and the frames of a recording.
 
+MOST_OBSERVED = 32  # neighbours, and rays around: each is written out in the driver
 SMALL = 2**28  # bytes that are not worth a look at what is free
 SHARE = 0.9  # of the free memory that one flight may take
 ROWS = 40  # numbers that a driver keeps of an agent besides its memory; the laws here keep 20 to 60
@@ -353,6 +354,7 @@ def open_state(
     given_start: bool = False,
     absence: bool = False,
     device: str = "cpu",
+    observe: tuple[int, int] = (0, 0),
 ) -> DriverState:
     """State of a flight before its first step.
 
@@ -360,22 +362,42 @@ def open_state(
                   drawn
     absence     : as in `plan_of`
     device      : cpu, or python, in double precision and with all pairs
+    observe     : as in `Plan`
     Raises FlightError where `start` cannot be flown.
     """
     given_start = given_start or start is not None
-    plan = flight_plan(scenario, precision, record, given_start=given_start, absence=absence, device=device)
+    plan = flight_plan(
+        scenario, precision, record, given_start=given_start, absence=absence, device=device, observe=observe
+    )
     given = None if start is None else check_start(scenario, plan, start)
     return DriverState.of(plan, scenario, seed, world, given, device)
 
 
 def flight_plan(
-    scenario: Scenario, precision: int, record: bool, *, given_start: bool, absence: bool, device: str
+    scenario: Scenario, precision: int, record: bool, *, given_start: bool, absence: bool, device: str,
+    observe: tuple[int, int] = (0, 0),
 ) -> Plan:  # fmt: skip
     """The plan that `open_state` flies by, before any text is made. Raises FlightError where memory cannot hold it."""
     plan = plan_of(scenario, precision=precision, record=record, absence=absence)
     plan = plan.built(grid=False, bits=64) if device == "python" else plan
+    if any(observe):  # observers go through all pairs
+        plan = check_observable(scenario, plan.built(grid=False, observe=observe))
     check_resources(scenario, plan)
     return plan.built(given_start=given_start)
+
+
+def check_observable(scenario: Scenario, plan: Plan) -> Plan:
+    """Return a plan whose agents can observe what it says. Raises FlightError, one line, where they cannot."""
+    count, rays = plan.observe
+    if plan.sequential:
+        raise FlightError(f"{scenario.name}: with update = 'sequential' agents move before all have observed")
+    for name, value, most, why in (
+        ("neighbours", count, min(scenario.agents - 1, MOST_OBSERVED), f"of {scenario.agents} agents"),
+        ("rays", rays, MOST_OBSERVED * plan.bounded, "" if plan.bounded else "nothing stands in this world"),
+    ):
+        if not 0 <= value <= most:
+            raise FlightError(f"{scenario.name}: {name} = {value}: give 0 to {most}{why and f'; {why}'}")
+    return plan
 
 
 def check_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:

@@ -185,8 +185,10 @@ class DriverState:
     def set_rows(self, names: Sequence[str], values: NDArray[Any]) -> None:
         """Write rows of the work table, (row, agent), agents by number."""
         places = [self.driver.ROWS[name] for name in names]
-        slot = np.arange(self.agents) if self.slots is None else self.slots
-        self.arrays["work"][np.ix_(places, slot)] = values
+        if (slot := self.slots) is None:
+            self.arrays["work"][places, : self.agents] = values
+        else:
+            self.arrays["work"][np.ix_(places, slot)] = values
 
     @property
     def has_slots(self) -> bool:

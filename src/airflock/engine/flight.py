@@ -1,13 +1,14 @@
 """Flight: a flight that can be advanced, read, changed, kept and branched. Cuts change no bit of it."""
 
 import pickle
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from numbers import Integral
-from typing import Any, NoReturn, Self
+from typing import Any, NamedTuple, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from airflock.engine.closed_flights import (
 from airflock.engine.driver_state import DriverState, hand_over
 from airflock.engine.drivers import compile_messages, device_of, is_compiled
 from airflock.engine.look import agent_view
-from airflock.engine.plan import NO_PACKET_TIME
+from airflock.engine.plan import NO_PACKET_TIME, Plan, plan_of
 from airflock.parts.metrics import reported_values
 from airflock.scenarios import (
     Event,
@@ -53,7 +54,7 @@ from airflock.scenarios import (
     with_settings,
     wrap_start,
 )
-from airflock.support import FlightError, run_in_background
+from airflock.support import FlightError, available_cores, run_in_background, run_in_threads
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,34 @@ class Window:
     begin: float
     end: float
     scores: dict[str, Any]
+
+
+class Percepts(NamedTuple):
+    """What all agents have measured and heard at a decision, by number; parts of one table, (agent, column).
+
+    velocity : own, as measured, m/s, (agent, axis); goal : offset to it, m, (agent, axis), no axes without goals
+    free     : free way along each ray, at most 100 m, evenly around from east on, in space then up and down
+    offset, closing : to the nearest that it hears and meets, m, and their velocities beside its own, m/s, nearest
+                      first, (agent, neighbour, axis)
+    age, heard      : how old that is, s, and 1; all four are 0 where it hears fewer, (agent, neighbour)
+    """
+
+    velocity: NDArray[Any]
+    goal: NDArray[Any]
+    free: NDArray[Any]
+    offset: NDArray[Any]
+    closing: NDArray[Any]
+    age: NDArray[Any]
+    heard: NDArray[Any]
+    table: NDArray[Any]
+
+    @classmethod
+    def of(cls, plan: Plan, table: NDArray[Any]) -> "Percepts":
+        """Parts of a table (..., agent, column), as views."""
+        velocity, goal, free, rest = (table[..., columns.start : columns.stop] for columns in plan.observed.values())
+        each, d = rest.reshape(*rest.shape[:-1], plan.observe[0], 2 * plan.dimensions + 2), plan.dimensions
+        parts = each[..., :d], each[..., d : 2 * d], each[..., 2 * d], each[..., 2 * d + 1]
+        return cls(velocity, goal, free, *parts, table)
 
 
 @dataclass(frozen=True)
@@ -113,7 +142,7 @@ def check_sendable(*scenarios: Scenario) -> None:
 class FlightState:
     """A flight as its drivers see it: steps flown one after another, whatever is read between them.
 
-    scenario : in force now; seed, precision, record, device, absence : of the whole flight
+    scenario : in force now; seed, precision, record, device, absence, observe : of the whole flight
     start    : positions and velocities to start from, (component, agent), or None
     state    : of the driver in force; steps : how many the flight has
     step     : the next to be flown; sensed : whether its agents have perceived and decided already
@@ -122,11 +151,15 @@ class FlightState:
     """
 
     def __init__(
-        self, scenario: Scenario, seed: int, precision: int, record: bool, start: Any, device: str, absence: bool
+        self, scenario: Scenario, seed: int, precision: int, record: bool, start: Any, device: str, absence: bool,
+        observe: tuple[int, int] = (0, 0),
     ):  # fmt: skip
         self.scenario, self.seed, self.world = scenario, seed, 0
         self.precision, self.record, self.device, self.absence = precision, record, device, absence
-        self.state = open_state(scenario, seed, precision, record, start, device=device, absence=absence)
+        self.observe = observe
+        self.state = open_state(
+            scenario, seed, precision, record, start, device=device, absence=absence, observe=observe
+        )
         self.origin = (scenario, seed, precision, None if start is None else np.array(start))
         self.steps, self.step, self.window_start, self.has_sensed = self.state.whole("steps"), 0, 0, False
         self.events: list[Event] = []
@@ -213,8 +246,9 @@ class FlightState:
         if step_counts(new)["steps"] < self.step:
             raise FlightError(f"duration = {new.flight.duration:g} s: the flight is at t = {self.time:g} s already")
         plan = flight_plan(
-            new, self.precision, self.record, given_start=old.given_start, absence=old.absence, device=self.device
-        )
+            new, self.precision, self.record, given_start=old.given_start, absence=old.absence, device=self.device,
+            observe=self.observe,
+        )  # fmt: skip
         # The same plan flies by the same driver, so there is nothing to wait for: only numbers
         # change.
         if wait or plan == old:
@@ -262,6 +296,7 @@ class FlightState:
         return open_state(
             scenario, self.seed, self.precision, self.record, world=self.world, device=self.device,
             given_start=self.state.plan.given_start, absence=absence,
+            observe=self.observe,
         )  # fmt: skip
 
     def _expect(self, state: DriverState, coming: Sequence[FaultOnset], lasting: Collection[int]) -> None:
@@ -603,6 +638,24 @@ class FlightActions(FlightObservations):
             self._course.has_sensed = True
         return self
 
+    def perceived(self) -> Percepts:
+        """Let all agents perceive and decide as `sense` does, and return what they have measured and heard, as arrays.
+
+        Raises FlightError as `sense` does, and for a flight that was opened without `neighbours` and `rays`.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1, neighbours=7, rays=8)
+        >>> percepts = flight.perceived()
+        >>> percepts.offset.shape, percepts.free.shape
+        ((100, 7, 2), (100, 8))
+        """
+        if not self._state.plan.observes:
+            raise FlightError(f"{self.scenario.name}: nobody observes; open the flight with neighbours=7, say")
+        self.sense()
+        return Percepts.of(self._state.plan, observed_rows(self._state).T.copy())
+
     def command(self, agent: int | Sequence[int], value: Any) -> Self:
         """Overrule what an agent, or each of several, decided at this step, until its next decision.
 
@@ -826,6 +879,8 @@ class Flight(FlightActions):
     events    : what is done to the flight on its way, as `events` of an earlier flight holds it
     absence   : agents will leave or join: a driver that knows who is there flies from the start, in place of a second
                 one that takes over when somebody leaves; the same bits
+    neighbours, rays : how many of the nearest that it hears, and ways around it, each agent keeps for `perceived`; the
+                       same bits. Faults of commands, and the rule of silence, then act on what `command` says, too
 
     Raises ScenarioError and FlightError, one line per fault.
 
@@ -851,13 +906,16 @@ class Flight(FlightActions):
         device: str = "cpu",
         events: Sequence[Event | Mapping[str, Any]] = (),
         absence: bool = False,
+        neighbours: int = 0,
+        rays: int = 0,
     ):
         if device not in self.DEVICES:
             raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(self.DEVICES)}")
         seed = check_seed(seed)
         self._course = FlightState(
-            load_if_named(scenario).with_drawn_scene(seed), seed, precision, record, start, device, absence
-        )
+            load_if_named(scenario).with_drawn_scene(seed), seed, precision, record, start, device, absence,
+            (neighbours, rays),
+        )  # fmt: skip
         self._planned = to_events(events)
         if world:
             self._course.switch_world(world)
@@ -1077,4 +1135,163 @@ class Flight(FlightActions):
             events=self.events,
             device=self.device,
             absence=self._course.absence,
+            neighbours=self._course.observe[0],
+            rays=self._course.observe[1],
         )
+
+
+def observed_rows(state: DriverState) -> NDArray[Any]:
+    """Rows of what agents observe, (column, agent), agents by number; a view where they lie so."""
+    first, count = state.driver.ROWS["seen0"], state.plan.observed["neighbours"].stop
+    rows: NDArray[Any] = state.arrays["work"][first : first + count, : state.agents]
+    return rows if state.slots is None else rows[:, state.slots]
+
+
+class Flights:
+    """Many flights, open side by side, that go on from decision to decision; arrays hold what all agents see and do.
+
+    `open_many` opens them.
+
+    commands   : of all agents, as their laws have decided, (flight, agent, axis): what is written there is flown
+    percepts   : what they decided from (`Percepts`), the same arrays all along: (flight, agent, ...)
+    over       : whether each flight has ended, (flight,)
+
+    What is commanded is not noted, unlike that of `airflock.open`. Faults of commands, and the rule of silence, act on
+    it as on a law's.
+    """
+
+    def __init__(
+        self, scenarios: Any, seeds: Sequence[int], neighbours: int, rays: int | None, threads: int | None, device: str
+    ):
+        each = [*scenarios] if isinstance(scenarios, (list, tuple)) else [scenarios] * len(seeds)
+        if not seeds or len(each) != len(seeds):
+            raise FlightError(f"open_many: {len(each)} scenarios for {len(seeds)} seeds; give one for all, or one each")
+        named = {id(scenario): load_if_named(scenario) for scenario in each}
+        self.scenarios: list[Scenario] = [named[id(scenario)] for scenario in each]
+        if rays is None:
+            rays = 8 if all(plan_of(scenario).bounded for scenario in named.values()) else 0
+        self.observe, self.threads, self.device = (int(neighbours), int(rays)), threads, device
+        self.courses = [self._opened(number, seed) for number, seed in enumerate(seeds)]
+        states = [course.state for course in self.courses]
+        shapes = {(s.agents, s.plan.dimensions, s.plan.observed["neighbours"].stop) for s in states}
+        if len(shapes) > 1:
+            raise FlightError("open_many: the scenarios differ in agents, dimensions or goals; open them apart")
+        ((agents, dims, columns),) = shapes
+        real = states[0].tables.row.dtype
+        self.commands: NDArray[Any] = np.zeros((len(states), agents, dims), real)
+        self.percepts = Percepts.of(states[0].plan, np.zeros((len(states), agents, columns), real))
+        self.over = np.zeros(len(states), bool)
+        self._in_threads(self._sense)
+
+    def _opened(self, number: int, seed: int) -> FlightState:
+        """One flight before its first step."""
+        scenario, seed = self.scenarios[number], check_seed(seed)
+        drawn = scenario.with_drawn_scene(seed)
+        return FlightState(drawn, seed, 32, False, None, self.device, False, self.observe)
+
+    def reset(self, number: int, seed: int) -> "Flights":
+        """Begin one of the flights anew with another seed."""
+        self.courses[number] = self._opened(number, seed)
+        self._sense(number)
+        return self
+
+    def advance(self) -> "Flights":
+        """Fly all that are not over by their commands, up to their next decision. Raises FlightError."""
+        bad = np.argwhere(~np.isfinite(self.commands))
+        if len(bad):
+            flight, agent, _ = bad[0]
+            raise FlightError(f"commands[{flight}, {agent}] = {self.commands[flight, agent].tolist()} is not finite")
+        self._in_threads(self._fly)
+        return self
+
+    def scores(self, number: int) -> dict[str, Any]:
+        """Order parameters and fitness of one flight, up to now."""
+        return self.courses[number].scenario.judged(self.courses[number].state.values())
+
+    @property
+    def fitness(self) -> NDArray[np.float64]:
+        """Fitness of each flight so far, by its metrics, (flight,); nan where it is not defined yet."""
+        bests = [scenario.metrics.rule.best for scenario in self.scenarios]
+        return np.array([self.scores(number).get(best, np.nan) for number, best in enumerate(bests)])
+
+    def _in_threads(self, work: Callable[[int], None]) -> None:
+        """Do something to each flight that is not over."""
+        due = np.flatnonzero(~self.over).tolist()
+        team = max(1, min(self.threads or available_cores(), len(due)))
+
+        def share(first: int) -> None:
+            for number in due[first::team]:
+                work(number)
+
+        list(run_in_threads([partial(share, first) for first in range(team)], team))
+
+    def _fly(self, number: int) -> None:
+        """Fly one flight by its commands up to its next decision, which it senses."""
+        course = self.courses[number]
+        state = course.state
+        state.set_rows([f"c{axis}" for axis in state.plan.axes], self.commands[number].T)
+        course.advance(min(course.step + state.whole("decide_every"), course.steps))
+        if not state.is_finite:
+            bad = int(np.flatnonzero(~np.isfinite(state.motion).all(axis=0) & state.present)[0])
+            raise FlightError(not_finite_message(course.scenario, course.seed, bad, course.step))
+        self._sense(number)
+
+    def _sense(self, number: int) -> None:
+        """Let the agents of one flight decide, where they do now, and take its last sample at its end."""
+        course = self.courses[number]
+        state = course.state
+        if not state.has_ended and course.step % state.whole("decide_every") == 0:
+            course.call(course.step, course.step + 1, 2)
+            course.has_sensed = True
+        if course.step == course.steps:
+            course.advance(course.steps + 1)
+        self.over[number] = course.has_ended
+        self.percepts.table[number] = observed_rows(state).T
+        self.commands[number] = state.rows([f"c{axis}" for axis in state.plan.axes]).T
+
+
+def open_many(
+    scenarios: Any,
+    seeds: Iterable[int],
+    *,
+    neighbours: int = 7,
+    rays: int | None = None,
+    threads: int | None = None,
+    device: str = "cpu",
+) -> Flights:
+    """Open many flights side by side, which go on together from decision to decision, their agents seen as arrays.
+
+    Parameters
+    ----------
+    scenarios : Scenario, str or list
+        One for all flights, or one for each seed, of as many agents and axes: a Scenario, a preset's name or a file.
+    seeds : iterable of int
+        One for each flight.
+    neighbours : int, optional
+        How many of the nearest that it hears each agent observes.
+    rays : int, optional
+        Ways around it that it observes; by default 8 where anything stands in the world.
+    threads : int, optional
+        How many fly them; all cores by default.
+    device : str, optional
+        cpu, or python: uncompiled, for debuggers, in double precision.
+
+    Returns
+    -------
+    Flights
+        With the arrays `percepts` and `commands`, and `advance()`.
+
+    Raises
+    ------
+    ScenarioError, FlightError
+        If a scenario cannot be loaded, or cannot give what is observed.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> flights = airflock.open_many("vasarhelyi_2018/4ms", seeds=range(4), neighbours=7)
+    >>> flights.commands[:] = flights.percepts.velocity  # everybody flies on
+    >>> flights.advance().percepts.offset.shape
+    (4, 100, 7, 2)
+    """
+    return Flights(scenarios, list(seeds), neighbours, rays, threads, device)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate
+from math import cos, sin, tau
 from typing import Any, NamedTuple
 
 from airflock.core import (
@@ -101,6 +102,7 @@ class Plan:
     grid      : neighbours by cells, all cores for one flock; else all pairs, one core
     near      : with `grid`: order parameters look at pairs and links by cells, too, where their rules allow it
     absence   : agents may be absent: they lie behind those who are there (`engine.absence_and_faults`)
+    observe   : how many of the nearest that it hears each agent keeps as rows, and rays around it (`stages.observe`)
     """
 
     model: Model
@@ -155,6 +157,7 @@ class Plan:
     grid: bool = False
     near: bool = False
     absence: bool = False
+    observe: tuple[int, int] = (0, 0)
 
     def __hash__(self) -> int:
         return self._hash
@@ -165,8 +168,32 @@ class Plan:
         return hash(tuple(getattr(self, each.name) for each in fields(self)))
 
     def built(self, **changes: Any) -> "Plan":
-        """Return this plan with other values of bits, record, given_start, grid, near or absence."""
+        """Return this plan with other values of bits, record, given_start, grid, near, absence or observe."""
         return replace(self, **changes if changes.get("grid", self.grid) else changes | {"near": False})
+
+    @property
+    def observes(self) -> bool:
+        """Return True if agents keep rows of what they observe."""
+        return any(self.observe)
+
+    @cached_property
+    def ray_directions(self) -> tuple[tuple[float, float, float], ...]:
+        """Unit vectors of the rays that are observed: evenly around from east on; in space, then up and down."""
+        turns = [tau * c / self.observe[1] for c in range(self.observe[1])]
+        flat = [(round(cos(turn), 12), round(sin(turn), 12), 0.0) for turn in turns]
+        return (*flat, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))[: len(flat) + (2 if flat and self.dimensions == 3 else 0)]
+
+    @cached_property
+    def observed(self) -> dict[str, range]:
+        """Columns of what is observed, by name; of each neighbour its offset, relative velocity, age and 1 if heard."""
+        counts = {
+            "velocity": self.dimensions,
+            "goal": self.dimensions if self.goals or self.own else 0,
+            "free": len(self.ray_directions),
+            "neighbours": self.observe[0] * (2 * self.dimensions + 2),
+        }
+        ends = accumulate(counts.values())
+        return {name: range(end - counts[name], end) for name, end in zip(counts, ends, strict=True)}
 
     def of(self, law: int) -> "Plan":
         """Return this plan as the stages of one law see it: its model, and its numbers under the letter p."""

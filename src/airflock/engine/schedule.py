@@ -29,7 +29,7 @@ ORDER: Mapping[str, StepEvent] = {
     "send": StepEvent(("snapshot",), "decide_every"),  # ahead of the decision by the delay
     "world": StepEvent(("aim_", "glide_", "appear_")),
     "decide": StepEvent(
-        ("perceive", "tune", "neighbours", "rearrange", "boundaries", "flock", "decide", "stop", "overrule"),
+        ("perceive", "tune", "neighbours", "rearrange", "boundaries", "flock", "decide", "stop", "overrule", "observe"),
         "decide_every",
     ),
     "watch": StepEvent(("measure_collision",), "collide_every"),
@@ -38,7 +38,7 @@ ORDER: Mapping[str, StepEvent] = {
     "obey": StepEvent(("obey",), "decide_every"),  # behind the decision by the body's dead time
     "move": StepEvent(("move",)),
 }
-STAGES_PER_LAW = ("neighbours", "boundaries", "decide")  # which ask a law: one of each for every law of the flock
+STAGES_PER_LAW = ("neighbours", "boundaries", "decide", "observe")  # one for every law of the flock
 AT_ONCE = ("perceive", "tune", "rearrange", "flock")  # for all agents: not where one after another decides and moves
 NEEDED: Mapping[str, Callable[[Plan], bool]] = {
     "snapshot": lambda plan: plan.late,
@@ -54,6 +54,7 @@ NEEDED: Mapping[str, Callable[[Plan], bool]] = {
     "queue": lambda plan: plan.lags,
     "obey": lambda plan: plan.lags,
     "overrule": lambda plan: bool(plan.suffers("overrule")),
+    "observe": lambda plan: plan.observes,
     "measure_collision": lambda plan: any(metric.clock == "collision" for metric in plan.metrics),
     "measure_sample": lambda plan: any(metric.clock == "sample" for metric in plan.metrics),
 }

@@ -201,10 +201,28 @@ def add_neighbours(build: Builder) -> None:
         meet=meet,
         sums=sums,
         images=build.images,
+        looks=False,
     )
     arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store, words", *more])
     name = f"neighbours{build.mark}"
     build.stage(name, arguments, made.once, made.body, made.answer, apart=plan.topology is None)
+
+
+def add_observe(build: Builder) -> None:
+    """Function observe: what each agent observes, as rows side by side, by the loop over the others that laws have."""
+    plan = build.plan
+    for columns in plan.observed.values():
+        for c in columns:
+            build.row(f"seen{c}")
+    meet = StageCall(f"meet({', '.join([MEET_ARGUMENTS, *world_arguments(plan)])})")
+    draws = plan.model.neighbour is None or not plan.packets  # else the law has received already
+    made = specialise(
+        build, neighbours.neighbours, n=driver_argument("n"), decision=driver_argument("k_"),
+        draw=StageCall(RECEIVE_CALLS[False]) if draws else None, drawn=None, meet=meet, sums=(),
+        images=build.images, looks=True,
+    )  # fmt: skip
+    arguments = "k_, n, m, time, late, row, whole, work, store, words, edges, spans, scene"
+    build.stage(f"observe{build.mark}", arguments, made.once, made.body, made.answer, apart=plan.topology is None)
 
 
 def add_decide(build: Builder) -> None:

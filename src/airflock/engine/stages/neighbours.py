@@ -6,7 +6,8 @@ from typing import Any
 from airflock.core import Model, norm
 from airflock.engine.plan import Plan
 from airflock.engine.stages.air import fill_clear, talkers_in_range
-from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, Sums, pair
+from airflock.engine.stages.observe import observe
+from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, LOOK, Sums, pair
 from airflock.engine.stages.receive import first_of_four, packet_count
 from airflock.engine.stages.records import Decision, FlightView, PairLoopAgent, SquaredRanges
 from airflock.engine.stages.state import FlockRows, agent_numbers, all_agents
@@ -67,10 +68,21 @@ def draw_words(i: int, flock: FlockRows, draw: Callable[[int], None], *, plan: P
             draw(i)
 
 
+def pair_parts(looks: bool, flight: FlightView) -> tuple[str, ...]:
+    """Return the passes over the others of an agent; an observer receives what a law without neighbours does not."""
+    return (
+        (() if not flight.plan.observe[0] else (HEAR,) if flight.model.neighbour is None else (LOOK,))
+        if looks
+        else (HEAR_AND_ADD,)
+        if flight.plan.topology is None
+        else (HEAR, ADD)
+    )
+
+
 def neighbours(
     agents: Iterable[int], others: Iterable[int], flight: FlightView, n: int, decision: int, time: float, late: float,
     words: Any, draw: Callable[[int], None] | None, drawn: Callable[[int, int], Any] | None,
-    meet: Callable[[int], None], *, sums: Sums, images: bool,
+    meet: Callable[[int], None], *, sums: Sums, images: bool, looks: bool = False,
 ) -> None:  # fmt: skip
     """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
@@ -81,6 +93,7 @@ def neighbours(
     meet   : fills the row `met` of agent i, where it does not meet all that it hears
     sums   : each field of Sums that is summed, and how it is reduced
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)
+    looks  : nothing is summed; each agent keeps what it observes
     """
     plan, model, flock, numbers = flight.plan, flight.model, flight.flock, flight.numbers
     k = numbers.k
@@ -129,10 +142,12 @@ def neighbours(
         me = PairLoopAgent(i, ii, ii, None, own, v, h, true, own_p, talkers, lot, all_agents(flock), reach, at)
         # One pass where everybody in range is met; two where a topology first ranks those who are
         # heard.
-        for part in (HEAR_AND_ADD,) if plan.topology is None else (HEAR, ADD):
+        for part in pair_parts(looks, flight):
             for j in others:
                 pair(me, j, j, part, total, flight, sums=sums, images=images)
-            if part == HEAR:
+            if part in (HEAR, LOOK) and plan.topology is not None:
                 meet(i)
+        if looks:
+            observe(i, others, flight)
         for c, _ in sums:
             flock.sums[c][i] = total[c]

@@ -23,8 +23,8 @@ from airflock.engine.stages.words import *
 from airflock.world import nearest_image
 
 # Where a topology chooses, the pair loop runs twice: first to find the agents that are heard, then
-# to add the terms of those that are met.
-HEAR_AND_ADD, HEAR, ADD = "both", "hear", "add"
+# to add the terms of those that are met. An observer looks at what the law has received already.
+HEAR_AND_ADD, HEAR, ADD, LOOK = "both", "hear", "add", "look"
 Sums = tuple[tuple[int, str], ...]  # each field of Sums that is summed, and how it is reduced
 
 
@@ -97,7 +97,7 @@ def pair_counts(
         ok = (apart2 <= squared_range(me.i, j, reach.radio_, flight.flock, plan=plan)) & is_other(me, q)
     else:
         ok = (other.r2 <= reach.radio_) & is_other(me, q)
-    if flight.model.reach is not None and (part != HEAR or plan.grid):
+    if flight.model.reach is not None and part != LOOK and (part != HEAR or plan.grid):
         ok = ok & (other.r2 <= reach.law)
     return ok
 
@@ -129,7 +129,7 @@ def receive_packet(
 ) -> None:
     """Let an agent hear what agent j has sent, and put the newest of it into `packet`, where packets are kept."""
     plan, flock, at = flight.plan, flight.flock, me.at
-    if plan.packets and part != ADD:
+    if plan.packets and part not in (ADD, LOOK):
         # Everything that a rule of the radio may take is offered by name; a driver computes only
         # the arguments of its rule.
         carried2 = squared_range(me.i, j, me.reach.radio, flock, plan=plan)
@@ -206,16 +206,20 @@ def pair(
     for a in (X, Y, Z):
         nh[a] = g * (v[a] + dv[a])
     other = NeighbourEstimate(d, dv, nh, r, r2, speed, age)
-    if part == HEAR:
+    if part in (HEAR, LOOK):
         # Where a topology chooses, pairs are visited twice: a rule that ranks neighbours must know
         # all before it adds one.
         others.square[q] = FAR  # and so it stays where an interpreted driver goes on to the next one
     ok = pair_counts(me, j, q, part, apart2, other, packet, flight)
     ok = packet_arrives(me, j, ok, part, apart2, r, flight)
-    if part == HEAR:
-        if plan.placed:
+    if part in (HEAR, LOOK):
+        if plan.placed or plan.observes:
             for a in axes:
                 others.away[a][q] = d[a]
+        if plan.observes:
+            for a in axes:
+                flight.flock.closing[a][j] = dv[a]
+            flight.flock.heard_age[j] = age
         others.square[q] = choose(ok, r2, FAR)
     else:
         add_rule(me, j, ok, other, total, flight, sums=sums)

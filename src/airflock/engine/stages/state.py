@@ -91,6 +91,9 @@ class FlockRows:
     stands_until: Row = row_attribute("stands_until")  # s
     away: Columns = columns_attribute("away")  # offsets of the others from one agent, m
     square: Row = row_attribute("square")  # squares of their distances, m²; FAR for agents not heard
+    closing: Columns = columns_attribute("closing")  # their velocities relative to its own, m/s
+    heard_age: Row = row_attribute("heard_age")  # how old what it has heard of each is, s
+    seen: Columns = columns_attribute("seen")  # what it observes (`Plan.observed`)
     hidden: Row = row_attribute("hidden")  # whether something that stands in the world hides each of them, 1 or 0
     clear: Row = row_attribute("clear")  # whether nothing stands in the way of packets from each of them, 1 or 0
     fade: Row = row_attribute("fade")  # normal number of the signal of each of them
