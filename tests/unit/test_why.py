@@ -1,5 +1,6 @@
 """Why two agents met: causes that were planted are named first, and nothing is named where nothing matters."""
 
+import json
 from io import StringIO
 
 import numpy as np
@@ -10,6 +11,8 @@ import airflock
 from airflock.certificates import causes
 from airflock.parts import FAULTS, RADIOS, SENSORS
 from airflock.scenarios import presets, with_settings
+from airflock.view import plot_why
+from processes import called
 
 SMALL = {
     "agents": 6, "duration": 120.0, "world.side": 70.0, "sensors.kind": "perfect", "body.noise": 0.05,
@@ -171,6 +174,86 @@ def test_equal_faults_go_together():
     found = causes.declared_interventions(twice)
     assert [name for name in found if name.startswith("faults")] == ["faults[0]", "faults[2]"]
     assert [entry.at for entry in with_settings(twice, found["faults[0]"]).faults] == [1e6, 1e6, None]
+
+
+def certificate(tmp_path):
+    """A certificate of flights with a silent radio, with the folder that keeps them."""
+    file = tmp_path / "silent.toml"
+    folder = tmp_path / "silent_flights"
+    made = airflock.certify(with_fault("radio_silent"), "r_min<3 at 1e-3/h", flights=12, folder=folder)
+    made.save(file)
+    return made, file
+
+
+def test_every_flight_of_a_certificate_with_an_event_is_explained_and_its_planted_cause_ranks_first(tmp_path):
+    made, file = certificate(tmp_path)
+    found = airflock.why(file)
+    assert len(found.flights) == made.verdicts[0].events > 2
+    assert found.causes[0] == "radio_silent (faults[0])" and "radio_silent (faults[0]) in" in found.text
+    assert found.document() == airflock.why(made).document()
+    one = airflock.why(file, found.flights[0].seed, futures=FUTURES, leads=[4.0])
+    assert one.event == found.flights[0].event and one.causes[0].without == "faults[0]"
+    (tmp_path / "silent_flights").rename(tmp_path / "elsewhere")
+    few = airflock.why(file)
+    assert {flight.seed for flight in few.flights} <= {flight.seed for flight in found.flights}
+    assert len(few.flights) == min(5, len(found.flights)) and "only the worst flights are known" in few.notes[0]
+    lines = {
+        "seed 3 is no flight with an event; there are ": lambda: airflock.why(file, 3),
+        "a certificate holds its scenario and events; leave out": lambda: airflock.why(file, limit=2.0),
+        "nothing to explain: no flight has an event": lambda: airflock.why(
+            airflock.certify(small(duration=5.0), "r_min<0.01 at 20%", flights=14)
+        ),
+        "limit polarisation<0.9: left out, as it has no moment": lambda: airflock.why(
+            airflock.certify(small(**{"metrics.kind": "order"}), "polarisation>=0.9 in 90%", flights=14)
+        ),
+    }
+    for text, request in lines.items():
+        line = line_of(request)
+        assert text in line, (text, line)
+
+
+def test_a_change_of_ones_own_is_compared_like_what_is_taken_away():
+    scenario = with_fault("radio_silent")
+    own = ["faults[0]", "world.side=400"]
+    found = airflock.why(scenario, hits(scenario, 1)[0], futures=FUTURES, leads=[4.0], interventions=own)
+    assert [row.without for row in found.rows][:3] == ["nothing", *own]
+    assert found.change(own[1]) == "with world.side=400"
+
+
+def test_the_smallest_set_ends_the_event_and_no_single_thing_of_it_does():
+    scenario = with_fault("gnss_offset", east=12.0)
+    for seed in hits(scenario, 4):
+        found = airflock.why(scenario, seed, futures=FUTURES)
+        rows = {row.without: row for row in found.rows if row.lead == found.rows[-1].lead}
+        for name in found.smallest_set if len(found.smallest_set) > 1 else ():
+            assert rows[name].share > causes.FEW, seed
+        if found.smallest_set:
+            assert any(
+                row.without.split(" + ") == [*found.smallest_set] and row.share <= causes.FEW for row in found.rows
+            )
+
+
+def test_the_picture_has_a_line_for_each_intervention_over_the_leads_that_were_flown():
+    scenario = with_fault("radio_silent")
+    found = airflock.why(scenario, hits(scenario, 1)[0], futures=10)
+    axes = plot_why(found).axes[0]
+    drawn = {bars.get_label(): bars[0] for bars in axes.containers}
+    assert list(drawn) == [found.change(name) for name in dict.fromkeys(row.without for row in found.rows)]
+    for row in found.rows:
+        line = drawn[found.change(row.without)]
+        assert (row.lead, row.share) in zip(line.get_xdata(), line.get_ydata(), strict=True)
+    assert axes.xaxis_inverted()
+
+
+def test_the_command_explains_a_flight_as_the_function_does(tmp_path):
+    scenario = "vasarhelyi_2018/4ms"
+    keys = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
+    keys += ["--set", "faults=[{kind = 'radio_silent', agents = [0], at = 20.0}]", "--futures", "20", "--leads", "4"]
+    seed = hits(with_fault("radio_silent"), 1)[0]
+    done = called("why", scenario, "--seed", seed, *keys, "--json", "--plot", tmp_path / "why.png")
+    assert done.returncode == 0, done.stderr
+    found = airflock.why(with_fault("radio_silent"), seed, futures=20, leads=[4.0])
+    assert json.loads(done.stdout)["text"] == found.text and (tmp_path / "why.png").stat().st_size > 1000
 
 
 def test_a_contact_with_the_world_is_an_event_too():

@@ -11,6 +11,7 @@ from .campaign import (
     used_and_unused_keys as used_and_unused_keys,
 )
 from .causes import (
+    HitCauses as HitCauses,
     WhyResult as WhyResult,
     why as why,
 )

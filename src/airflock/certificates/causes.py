@@ -1,5 +1,7 @@
 """Causes: why two agents met, by ensembles of futures that branch off before it, each with one thing taken away.
 
+Of a certificate, each flight with an event is explained so, with fewer futures, and causes are ranked over all.
+
 The flight is flown up to some seconds before its event. From there many futures draw fresh noise,
 once as the flight was, and once for each intervention: without delay, without a fault. All use the
 same numbers, so that futures of the same number are compared in pairs.
@@ -13,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from html import escape
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +24,9 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.stats import binomtest
 
+from airflock.certificates.campaign import COUNT_PURPOSE, certificate_seed
+from airflock.certificates.certificate import Certificate, campaign_of_document, check_document_shape
+from airflock.certificates.certification import certify
 from airflock.certificates.limits import lower_bound
 from airflock.engine import Flight
 from airflock.recordings import (
@@ -30,16 +36,28 @@ from airflock.recordings import (
     scenario_to_fly_again,
     upper_probability_bound,
 )
-from airflock.scenarios import Event, Scenario, check_seed, named_fault_entries, scenario_variant, to_events
+from airflock.runs import RESULT_FILE, with_parameters
+from airflock.scenarios import (
+    Event,
+    Scenario,
+    check_seed,
+    named_fault_entries,
+    scenario_variant,
+    to_events,
+    with_settings,
+)
 from airflock.support import (
     RECORDINGS,
     ErrorCollector,
     FlightError,
     RecordingError,
     ScenarioError,
+    expand_path,
     format_cell,
     holm_correction,
     is_number,
+    parse_toml_value,
+    read_toml,
     result_group,
     result_table,
     run_in_threads,
@@ -48,12 +66,18 @@ from airflock.support import (
 from airflock.world import half_sizes
 
 EVENTS = {"pair": "n_coll", "world": "n_contacts"}  # what may happen → the count that says so
+# score of a limit → the event that it bounds; other scores have no moment to branch off before
+EVENT_OF_SCORE = {**dict.fromkeys(("r_min", "n_coll", "phi_coll"), "pair")}
+EVENT_OF_SCORE |= dict.fromkeys(("n_contacts", "touching", "clearance", "phi_wall"), "world")
 LEADS = (8.0, 4.0, 2.0)  # s
 FUTURES = 200
+# Of all hits of a certificate, which together say more than one: strong causes show with fewer futures.
+HIT_LEADS, HIT_FUTURES, HIT_INTERVENTIONS = (4.0,), 60, 12
 AFTER = 2.0  # s after the event: a future that is a little later than the flight has it, too
 LEVEL = 0.02  # error probability of all causes that are named together (Holm 1979)
 CONFIDENCE = 0.95  # of each interval
-FEW = 0.05  # share of futures: below it one cause alone ends the event, and no second one is looked for
+FEW = 0.05  # share of futures: an intervention that leaves no more of them ends the event
+MOST_TOGETHER = 3  # interventions of a set
 FIRST_WORLD = 1 << 31  # of the futures: no flight by hand counts so far
 # m/s, standard deviation per axis of a push at the start of each future: without it all futures of a
 # scenario whose only noise is taken away were one, and its chaos would pass for a cause.
@@ -99,6 +123,12 @@ def declared_interventions(scenario: Scenario) -> dict[str, Settings]:
             never = {key: v for key, v in entries[number].items() if key not in ENDS} | {"at": NEVER}
             found[f"faults[{number}]"] = {"faults": [never if k in same else e for k, e in enumerate(entries)]}
     return {name: settings for name, settings in found.items() if settings}
+
+
+def own_interventions(names: Sequence[str]) -> dict[str, Settings]:
+    """Return the changes among interventions, KEY=VALUE: name → keys to change."""
+    parts = {name: name.partition("=") for name in names if "=" in name}
+    return {name: {key.strip(): parse_toml_value(value.strip())} for name, (key, _, value) in parts.items()}
 
 
 @dataclass(frozen=True)
@@ -153,7 +183,7 @@ class WhyResult:
         def rank(row: CauseRow) -> tuple[int, float, bool]:
             # What disturbs is said before another body that would stand it, and what ends the event
             # alone before two together; of equals a fault, as flights have the others at all times.
-            kind = 2 if TOGETHER in row.without else int(row.without == "body.tau")
+            kind = 2 if TOGETHER in row.without else int(row.without == "body.tau" or "=" in row.without)
             return kind, -self._drop(row), not row.without.startswith("faults")
 
         return sorted(best.values(), key=rank)
@@ -162,6 +192,13 @@ class WhyResult:
     def avoidable_until(self) -> float | None:
         """Shortest lead, s, at which something that was tried lowered the probability; None: at no lead."""
         return min((row.lead for row in self.rows if row.is_named), default=None)
+
+    @property
+    def smallest_set(self) -> tuple[str, ...]:
+        """Fewest interventions that were found to end it, in all but 5 % of the futures; empty if none does."""
+        ending = [row for row in self.rows if row.is_named and row.share <= FEW]
+        best = min(ending, key=lambda row: (row.without.count(TOGETHER), row.share, row.lead), default=None)
+        return () if best is None else tuple(best.without.split(TOGETHER))
 
     @property
     def table(self) -> Any:
@@ -176,9 +213,10 @@ class WhyResult:
         said = [f"{self.event}."]
         for row in self.causes:
             many = f"{row.events} of {row.futures} futures instead of {self._nothing(row.lead).events}"
-            changed = "With half of" if row.without == "body.tau" else "Without"
-            label = self._label(row.without)
-            said.append(f"{changed} {label} it would have happened in {many} (from {row.lead:g} s before).")
+            changed = self.change(row.without)
+            said.append(
+                f"{changed[0].upper()}{changed[1:]} it would have happened in {many} (from {row.lead:g} s before)."
+            )
         if not self.causes:
             said.append(self._unexplained())
         last = self.avoidable_until
@@ -202,10 +240,16 @@ class WhyResult:
     def _drop(self, row: CauseRow) -> float:
         return self._nothing(row.lead).share - row.share
 
-    def _label(self, name: str) -> str:
+    def label(self, name: str) -> str:
         """Return an intervention in words: a fault by its kind and number."""
         kinds = {f"faults[{k}]": f"{entry.fault.name} (faults[{k}])" for k, entry in enumerate(self.scenario.faults)}
         return " and ".join(kinds.get(part, part) for part in name.split(TOGETHER))
+
+    def change(self, name: str) -> str:
+        """Return in words what an intervention changes, such as `without radio.delay`."""
+        if name == NOTHING:
+            return name
+        return f"{'with half of' if name == 'body.tau' else 'with' if '=' in name else 'without'} {self.label(name)}"
 
     def document(self) -> dict[str, Any]:
         """Return the result as plain values, for JSON.
@@ -222,7 +266,8 @@ class WhyResult:
         rows = [{**asdict(row), "p_value": None if row.without == NOTHING else row.p_value} for row in self.rows]
         made = {key: value for key, value in vars(self).items() if key != "scenario"}
         made |= {"scenario": self.scenario.name, "text": self.text, "avoidable_until": self.avoidable_until}
-        return {**made, "causes": [row.without for row in self.causes], "rows": rows}
+        named = {"causes": [row.without for row in self.causes], "smallest_set": self.smallest_set}
+        return {**made, **named, "rows": rows}
 
     def __repr__(self) -> str:
         return f"<Why in {self.scenario.name}, seed {self.seed}: {self.text}>"
@@ -232,7 +277,7 @@ class WhyResult:
         rows = [
             (
                 f"{row.lead:g}",
-                self._label(row.without),
+                self.label(row.without),
                 f"{row.events} of {row.futures}",
                 f"{row.low:.2f} to {row.high:.2f}",
                 format_cell(row.p_value, ""),
@@ -247,6 +292,61 @@ class WhyResult:
         """Return sentence and table, for a notebook."""
         notes = "".join(f"<li>{escape(note)}</li>" for note in self.notes)
         return f"<p><b>{escape(self.text)}</b></p>{self.table.to_html(index=False)}<ul>{notes}</ul>"
+
+
+@dataclass(frozen=True)
+class HitCauses:
+    """Causes of all flights of a certificate that have an event, ranked.
+
+    name : of the scenario; flights : the results, one a flight; notes : what was left out
+    """
+
+    name: str
+    flights: tuple[WhyResult, ...]
+    notes: tuple[str, ...] = field(default_factory=tuple)
+
+    @property
+    def table(self) -> Any:
+        """Return a row for each intervention: flights that name it, its futures with the event and those of nothing."""
+        import pandas as pd  # not on top: a flight needs no tables
+
+        shares: dict[str, list[tuple[int, int, int]]] = {}
+        for flight in self.flights:
+            named = {part for cause in flight.causes for part in cause.without.split(TOGETHER)}
+            for row in (row for row in flight.rows if row.without != NOTHING and TOGETHER not in row.without):
+                bare = next(r.events for r in flight.rows if r.lead == row.lead and r.without == NOTHING)
+                shares.setdefault(flight.label(row.without), []).append((row.without in named, row.events, bare))
+        rows = [(name, *map(sum, zip(*each, strict=True)), len(each)) for name, each in shares.items()]
+        rows.sort(key=lambda row: (-row[1], row[2] - row[3]))
+        return pd.DataFrame(rows, columns=["without", "named_in", "events", "events_of_nothing", "tried_in"])
+
+    @property
+    def causes(self) -> list[str]:
+        """Interventions that at least one flight names, in most flights first."""
+        table = self.table
+        return list(table["without"][table["named_in"] > 0])
+
+    @property
+    def text(self) -> str:
+        """Return which causes are named in how many flights, in a sentence."""
+        total, table = len(self.flights), self.table
+        said = [f"{row.without} in {row.named_in} of {total}" for row in table.itertuples() if row.named_in]
+        none = sum(not flight.causes for flight in self.flights)
+        lone = [f"in {none} of {total} no cause is shown"] if none else []
+        return f"Flights with an event, by cause: {', '.join([*said, *lone])}."
+
+    def document(self) -> dict[str, Any]:
+        """Return the result as plain values, for JSON."""
+        rows, flights = self.table.to_dict("records"), [flight.document() for flight in self.flights]
+        return {"scenario": self.name, "text": self.text, "rows": rows, "flights": flights, "notes": list(self.notes)}
+
+    def __rich__(self) -> Any:
+        """Return sentence, table, one line a flight, and notes, for a terminal."""
+        cells = [[str(cell) for cell in row] for row in self.table.itertuples(index=False)]
+        heads = "without; >named in flights; >futures with it; >with nothing taken away; >tried in"
+        table = result_table(f"{self.name}: {len(self.flights)} flights with an event", heads, cells)
+        lines = [f"seed {flight.seed}: {flight.text}" for flight in self.flights]
+        return result_group(table, self.text, *lines, *self.notes)
 
 
 @dataclass(frozen=True)
@@ -266,19 +366,25 @@ class _FlownFlight:
         return flight.advance(steps=until) if until else flight
 
 
+def _measured(scenario: Scenario, limit: float | None) -> Scenario:
+    """Return the scenario measured by collisions and contacts at every step: metrics do not change a flight."""
+    radius = {} if limit is None else {"metrics.r_coll": float(limit)}
+    return scenario_variant(scenario, {"metrics.kind": "contacts"} | radius)
+
+
 def event_count(flight: Flight, score: str) -> float:
     """Return how often an event happened since the start of a flight, over all its windows."""
     return float(sum(window.scores[score] for window in flight.windows) + flight.scores()[score])
 
 
 def why(
-    scenario: Scenario | str | PathLike[str] | xr.Dataset,
+    scenario: Scenario | Certificate | str | PathLike[str] | xr.Dataset,
     seed: int | None = None,
     *,
     event: str = "pair",
     limit: float | None = None,
-    leads: Sequence[float] = LEADS,
-    futures: int = FUTURES,
+    leads: Sequence[float] | None = None,
+    futures: int | None = None,
     interventions: Sequence[str] | None = None,
     budget: float | None = None,
     threads: int | None = None,
@@ -286,26 +392,29 @@ def why(
     law: Any = None,
     trust: bool = False,
     say: Callable[[str], None] | None = None,
-) -> WhyResult:
+) -> "WhyResult | HitCauses":
     """Say why two agents met in a flight: by many futures that branch off before it, each without one thing.
 
     Parameters
     ----------
-    scenario : Scenario, str, path or xarray.Dataset
-        What flew, with its seed; or a recording, as `airflock.simulate` returns it, or its file (.nc).
+    scenario : Scenario, Certificate, str, path or xarray.Dataset (FLIGHT.nc|PRESET|FILE|CERTIFICATE)
+        A recording, as `airflock.simulate` returns it, or its file; what flew, with its seed; or a certificate, of
+        which every flight with an event is explained, or that of `seed` alone.
     seed : int, optional
         Of the flight; a recording holds its own.
-    event : str
+    event : {"pair", "world"}
         pair: two agents nearer than `limit`; world: an agent touches a wall, an obstacle or the scene, which soft
-        walls allow. The first one of the flight is explained.
+        walls allow. The first one of the flight is explained; a certificate has its own.
     limit : float, optional
         Distance of a pair, m; by default metrics.r_coll.
-    leads : sequence of float
-        How long before the event futures branch off, s.
-    futures : int
-        Flights for each lead and intervention, at least 10. Fewer than 100 show strong causes only.
+    leads : sequence of float (S,S), optional
+        How long before the event futures branch off, s; by default 8,4,2, and 4 for all flights of a certificate.
+    futures : int, optional
+        Flights for each lead and intervention, at least 10. Fewer than 100 show strong causes only; by default 200, and
+        60 for all flights of a certificate.
     interventions : sequence of str, optional
-        What to take away, such as ["radio.delay", "faults[0]"]; by default all that the scenario declares.
+        What to take away, such as radio.delay or faults[0], or to change, such as model.p_rep=0.2; by default all that
+        the scenario declares.
     budget : float, optional
         Time after which no further futures begin, s; compilation does not count.
     threads : int, optional
@@ -321,12 +430,13 @@ def why(
 
     Returns
     -------
-    WhyResult
-        text, the sentence; table, a row for each lead and intervention; causes, strongest first.
+    WhyResult or HitCauses
+        text, the sentence; table, a row for each lead and intervention; causes, strongest first. Of a certificate
+        HitCauses: the same over all its flights with an event.
 
     Raises
     ------
-    FlightError, ScenarioError, RecordingError, ParameterError
+    FlightError, ScenarioError, RecordingError, StudyError, ParameterError
         If nothing happened in the flight, it cannot be flown again, or an argument is out of its range.
 
     Notes
@@ -343,20 +453,113 @@ def why(
     >>> found.table["without"].tolist()
     ['nothing', 'radio.delay']
     """
+    source = _certificate(scenario)
+    is_survey = source is not None and seed is None
+    leads = (HIT_LEADS if is_survey else LEADS) if leads is None else leads
+    futures = (HIT_FUTURES if is_survey else FUTURES) if futures is None else futures
     _check_arguments(event, limit, leads, futures, budget)
-    notify = say or (lambda line: None)
-    flown = _flown_flight(scenario, seed, limit, settings, law, trust)
+    how = _Request(leads, futures, interventions, budget, threads, say or (lambda line: None))
+    if source is None:
+        return _explained(_flown_flight(scenario, seed, limit, settings, law, trust), event, how)
+    if limit is not None or event != "pair" or settings or law is not None:
+        raise ScenarioError(["why: a certificate holds its scenario and events; leave out event, limit, settings, law"])
+    name, hits, notes = _hits(source, trust)
+    if seed is None:
+        return _survey(name, hits, notes, how)
+    if (chosen := next((hit for hit in hits if hit[0].seed == seed), None)) is None:
+        known = ", ".join(str(flown.seed) for flown, _ in hits[:5])
+        raise FlightError(f"{name}: seed {seed} is no flight with an event; there are {len(hits)}: {known}, ...")
+    return _explained(*chosen, how)
+
+
+@dataclass(frozen=True)
+class _Request:
+    """How a flight is to be explained, as `why` takes it."""
+
+    leads: Sequence[float]
+    futures: int
+    interventions: Sequence[str] | None
+    budget: float | None
+    threads: int | None
+    notify: Callable[[str], None]
+
+
+def _explained(flown: _FlownFlight, event: str, how: _Request) -> WhyResult:
+    """Explain the first event of one flight."""
     step, time_of_event, agents, sentence = _first_event(flown, event)
-    notify(sentence)
+    how.notify(sentence)
     dt = flown.scenario.flight.dt
-    steps = dict.fromkeys(min(max(1, round(lead / dt)), step - 1) for lead in sorted(leads, reverse=True))
+    steps = dict.fromkeys(min(max(1, round(lead / dt)), step - 1) for lead in sorted(how.leads, reverse=True))
     notes = [f"each future begins with pushes of {PUSH:g} m/s (SD per axis), so that no two are the same"]
-    if max(leads) > (step - 1) * dt:
+    if max(how.leads) > (step - 1) * dt:
         notes.append(f"the event comes {time_of_event:g} s after the start: no future branches off earlier")
-    ensembles = _Ensembles(flown, step, EVENTS[event], futures, threads, budget, notify, notes)
-    rows = ensembles.fly(list(steps), interventions)
+    ensembles = _Ensembles(flown, step, EVENTS[event], how.futures, how.threads, how.budget, how.notify, notes)
+    rows = ensembles.fly(list(steps), how.interventions)
     in_force = ensembles.bases[min(steps)].scenario  # with faults that were begun by hand
     return WhyResult(in_force, flown.seed, sentence, time_of_event, agents, rows, tuple(dict.fromkeys(notes)))
+
+
+def _certificate(given: Any) -> Certificate | Path | None:
+    """Return the certificate, or the path of one, that `why` was given; None for anything else."""
+    if isinstance(given, Certificate):
+        return given
+    path = expand_path(given) if isinstance(given, str | PathLike) and str(given).endswith(".toml") else None
+    return path if path is not None and path.is_file() and "seal" in read_toml(path) else None
+
+
+def _hits(source: Certificate | Path, trust: bool) -> tuple[str, list[tuple[_FlownFlight, str]], list[str]]:
+    """Return the name of a certificate's scenario, its flights that have an event, and notes on what is left out."""
+    notes, found = [], source if isinstance(source, Certificate) else None
+    if isinstance(source, Path):
+        document, folder = read_toml(source), source.parent / f"{source.stem}_flights"
+        check_document_shape(document, str(source))
+        campaign = campaign_of_document(document, str(source), None, trust)
+        if (folder / RESULT_FILE).is_file():
+            kept = certify(folder=folder, resume=True, trust=trust)  # which is over, so that nothing flies
+            found = kept if kept.document()["flights"] == document["flights"] else None
+        if found is None:
+            notes.append(f"only the worst flights are known: {folder.name}, which keeps all, is not that of {source}")
+    if found is not None:
+        campaign = found.campaign
+        seeds = [certificate_seed(campaign.hash, COUNT_PURPOSE, number) for number in range(len(found.rows))]
+        rows = list(zip(seeds, found.rows, strict=True))
+        events = [(limit, own) for limit in campaign.limits for own, row in rows if limit.has_happened(row)]
+    else:
+        limits = {limit.event: limit for limit in campaign.limits}
+        worst = [(limits[entry["limit"]], entry) for entry in document["worst"]]
+        events = [(limit, int(e["seed"])) for limit, e in worst if limit.has_happened({limit.score: e["value"]})]
+    hits: dict[tuple[int, str], _FlownFlight] = {}
+    for limit, own in events:
+        if (event := EVENT_OF_SCORE.get(limit.score)) is None:
+            notes.append(f"limit {limit.event}: left out, as it has no moment that could be explained")
+            continue
+        flown = with_parameters(campaign.scenario, campaign.parameters(own))
+        measured = _measured(flown, limit.value if limit.score == "r_min" else None)
+        hits.setdefault((own, event), _FlownFlight(measured, own, campaign.bits, campaign.device))
+    if not hits:
+        raise FlightError("; ".join([f"{campaign.scenario.name}: nothing to explain: no flight has an event", *notes]))
+    return campaign.scenario.name, [(flown, event) for (_, event), flown in hits.items()], list(dict.fromkeys(notes))
+
+
+def _survey(name: str, hits: Sequence[tuple[_FlownFlight, str]], notes: list[str], how: _Request) -> HitCauses:
+    """Explain every hit: perturbations and faults alone, so that no flight takes long."""
+    ends = np.inf if how.budget is None else time.monotonic() + how.budget
+    flights = []
+    for flown, event in hits:
+        if time.monotonic() > ends:
+            notes.append(f"budget = {how.budget:g} s was spent: {len(hits) - len(flights)} flights are left out")
+            break
+        names = [name for name in declared_interventions(flown.scenario) if name != "body.tau"]
+        if len(names) > HIT_INTERVENTIONS and how.interventions is None:
+            notes.append(f"tried: the first {HIT_INTERVENTIONS} of {len(names)} perturbations and faults")
+        chosen = names[:HIT_INTERVENTIONS] if how.interventions is None else how.interventions
+        try:
+            flights.append(_explained(flown, event, replace(how, interventions=chosen, budget=None)))
+        except FlightError as error:
+            notes.append(f"left out: {error}")
+    if not flights:
+        raise FlightError(f"{name}: no flight could be explained; {'; '.join(notes)}")
+    return HitCauses(name, tuple(flights), tuple(dict.fromkeys(notes)))
 
 
 def _check_arguments(
@@ -383,15 +586,14 @@ def _check_arguments(
 def _flown_flight(
     given: Any, seed: int | None, limit: float | None, settings: Mapping[str, Any] | None, law: Any, trust: bool
 ) -> _FlownFlight:
-    """Return what flew, measured by collisions and contacts at every step: metrics do not change a flight."""
-    measured = {"metrics.kind": "contacts"} | ({} if limit is None else {"metrics.r_coll": float(limit)})
+    """Return what flew."""
     if isinstance(given, str | PathLike) and str(given).endswith(RECORDINGS):
         given = load_recording(given)
     if not isinstance(given, xr.Dataset):
         if seed is None:
             raise ScenarioError(["seed: is needed to fly the flight again, such as why(scenario, seed=7)"])
         scenario = scenario_variant(given, settings, law, trust=trust)
-        return _FlownFlight(scenario_variant(scenario, measured), check_seed(seed))
+        return _FlownFlight(_measured(scenario, limit), check_seed(seed))
     if seed is not None:
         raise ScenarioError([f"seed = {seed}: a recording holds the seed of its flight; leave it out"])
     scenario = scenario_to_fly_again(given, law, settings, trust=trust)
@@ -406,7 +608,7 @@ def _flown_flight(
         events += [Event(event.step, event.kind, data)] if data or not event.data else []
     bits = attributes.read_integer(given, "airflock_precision", 32)
     device, own = str(given.attrs.get("airflock_device", "cpu")), attributes.read_integer(given, "airflock_seed")
-    return _FlownFlight(scenario_variant(scenario, measured), own, bits, device, tuple(events))
+    return _FlownFlight(_measured(scenario, limit), own, bits, device, tuple(events))
 
 
 def _first_event(flown: _FlownFlight, event: str) -> tuple[int, float, tuple[int, ...], str]:
@@ -458,7 +660,7 @@ def _nearest_pair(flight: Flight) -> tuple[tuple[int, int], float]:
 class _Ensembles:
     """Futures of a flight: of each lead (steps) and intervention, which of them have the event.
 
-    outcomes : (lead, name) → (future,); bases : lead → flight from which futures branch off
+    outcomes : (lead, name) → (future,); bases : lead → flight from which futures branch off; known : its interventions
     """
 
     flown: _FlownFlight
@@ -471,28 +673,32 @@ class _Ensembles:
     notes: list[str]
     outcomes: dict[tuple[int, str], NDArray[np.bool_]] = field(default_factory=dict)
     bases: dict[int, Flight] = field(default_factory=dict)
+    known: dict[int, dict[str, Settings]] = field(default_factory=dict)
     ends: float = np.inf
 
     def fly(self, leads: Sequence[int], chosen: Sequence[str] | None) -> tuple[CauseRow, ...]:
         """Fly all futures and judge them. Raises ScenarioError for an intervention that no lead has."""
         self.bases = {lead: self.flown.open(self.step - lead, fresh=True) for lead in leads}
-        known = {lead: declared_interventions(base.scenario) for lead, base in self.bases.items()}
-        every = list(dict.fromkeys(name for each in known.values() for name in each))
-        known_line = f"this flight has {', '.join(every) or 'none'}"
+        own = {} if chosen is None or isinstance(chosen, str) else own_interventions(chosen)
+        self.known = {lead: declared_interventions(base.scenario) | own for lead, base in self.bases.items()}
+        every = list(dict.fromkeys(name for each in self.known.values() for name in each))
+        known_line = f"this flight has {', '.join(every) or 'none'}; a change of your own is KEY=VALUE"
         if isinstance(chosen, str):
             raise ScenarioError([f"interventions = {chosen!r} is no list of names; {known_line}"])
         if unknown := [name for name in chosen or () if name not in every]:
             raise ScenarioError([f"interventions: {name}: unknown; {known_line}" for name in unknown])
+        for settings in own.values():
+            with_settings(self.flown.scenario, settings)  # a wrong key is an error, and no note
         self.ends = np.inf if self.budget is None else time.monotonic() + self.budget
         for lead in leads:
-            taken = {name: each for name, each in known[lead].items() if chosen is None or name in chosen}
+            taken = {name: each for name, each in self.known[lead].items() if chosen is None or name in chosen}
             self._fly(lead, NOTHING, {})
             for name, settings in taken.items():
                 self._fly(lead, name, settings)
         if not self.outcomes:
             raise FlightError(f"budget = {self.budget:g} s is too short for {self.futures} futures; give more")
         rows = self._judged()
-        return (*rows, *self._two_together(rows))
+        return (*rows, *self._together(rows))
 
     def _fly(self, lead: int, name: str, settings: Settings) -> None:
         """Fly the futures of one intervention, and keep which of them have the event."""
@@ -564,26 +770,28 @@ class _Ensembles:
         high = upper_probability_bound(events, self.futures, sure)
         return CauseRow(lead * self.flown.scenario.flight.dt, name, events, self.futures, low, high, p_value)
 
-    def _two_together(self, rows: Sequence[CauseRow]) -> list[CauseRow]:
-        """Take the two strongest causes of one lead away together, where the stronger one alone leaves events."""
+    def _together(self, rows: Sequence[CauseRow]) -> list[CauseRow]:
+        """Take further causes of one lead away with the strongest one while events are left: a smallest set, greedily."""
         named = sorted((row for row in rows if row.is_named), key=lambda row: row.events)
-        if not named or named[0].events <= FEW * self.futures:
+        if not named:
             return []
-        lead = round(named[0].lead / self.flown.scenario.flight.dt)
-        names = [row.without for row in named if row.lead == named[0].lead][:2]
-        if len(names) < 2:
-            return []
-        known = declared_interventions(self.bases[lead].scenario)
-        first, second = (known[name] for name in names)
-        both, name = first | second, TOGETHER.join(names)
-        if "faults" in first and "faults" in second:
-            entries = named_fault_entries(self.bases[lead].scenario)
-            both["faults"] = [
-                b if a == e else a for a, b, e in zip(first["faults"], second["faults"], entries, strict=True)
-            ]
-        self._fly(lead, name, both)
-        if (lead, name) not in self.outcomes:
-            return []
-        p = self._p_value((lead, names[0]), (lead, name))
-        row = self._row(lead, name, p)
-        return [replace(row, is_named=p <= LEVEL and row.events < named[0].events)]
+        best, made = named[0], []
+        lead = round(best.lead / self.flown.scenario.flight.dt)
+        known, entries = self.known[lead], named_fault_entries(self.bases[lead].scenario)
+        settings = known[best.without]
+        for name in [row.without for row in named if row.lead == best.lead][1:MOST_TOGETHER]:
+            if best.events <= FEW * self.futures:
+                break
+            both, label = settings | known[name], f"{best.without}{TOGETHER}{name}"
+            if "faults" in settings and "faults" in known[name]:  # each leaves the entries of the other as they were
+                pairs = zip(settings["faults"], known[name]["faults"], entries, strict=True)
+                both["faults"] = [b if a == entry else a for a, b, entry in pairs]
+            self._fly(lead, label, both)
+            if (lead, label) not in self.outcomes:
+                break
+            p = self._p_value((lead, best.without), (lead, label))
+            row = self._row(lead, label, p)
+            made.append(replace(row, is_named=p <= LEVEL and row.events < best.events))
+            if made[-1].is_named:
+                best, settings = made[-1], both
+        return made

@@ -496,13 +496,7 @@ def check_document(
     on_done: Callable[[], None] | None = None,
 ) -> CheckReport:
     """Check the content of a certificate, whose scenario `scenario` replaces. Raises like `check_certificate`."""
-    if not {"seal", "format", "limit", "flights", "scenario"} <= set(document):
-        raise StudyError(f"{where}: is not a certificate; airflock certify writes one")
-    if document["format"] != CERTIFICATE_FORMAT:
-        raise StudyError(f"{where}: is of format {document['format']}; this Airflock reads format {CERTIFICATE_FORMAT}")
-    faults = _shape_faults(document)
-    if faults:
-        raise StudyError(f"{where}: is damaged: {'; '.join(faults)}")
+    check_document_shape(document, where)
     with as_error(f"{where}: is damaged", StudyError):
         flown = document["flown"]
         if flown["airflock"] != __version__:
@@ -514,7 +508,7 @@ def check_document(
             if certificate_checksum(document) != document["seal"]
             else []
         )
-        campaign = _campaign(document, where, scenario, trust)
+        campaign = campaign_of_document(document, where, scenario, trust)
         faults += _sums(document, campaign)
         rules = campaign.document()["rules"]
         if rules != flown["rules"]:
@@ -524,6 +518,16 @@ def check_document(
             )
         found, notes = _flown_again(document, campaign, threads, on_done), _differences(flown)
     return CheckReport(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
+
+
+def check_document_shape(document: Mapping[str, Any], where: str) -> None:
+    """Raise StudyError where a document is no certificate, is of another format, or lacks keys."""
+    if not {"seal", "format", "limit", "flights", "scenario"} <= set(document):
+        raise StudyError(f"{where}: is not a certificate; airflock certify writes one")
+    if document["format"] != CERTIFICATE_FORMAT:
+        raise StudyError(f"{where}: is of format {document['format']}; this Airflock reads format {CERTIFICATE_FORMAT}")
+    if faults := _shape_faults(document):
+        raise StudyError(f"{where}: is damaged: {'; '.join(faults)}")
 
 
 MOST_DIGESTS = 1_000_000  # flights that a certificate may ask to be flown again
@@ -569,7 +573,8 @@ def _is(value: Any, kinds: tuple[type, ...]) -> bool:
     return isinstance(value, kinds) and (not isinstance(value, bool) or bool in kinds)
 
 
-def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None, trust: bool) -> Campaign:
+def campaign_of_document(document: Mapping[str, Any], where: str, scenario: Scenario | None, trust: bool) -> Campaign:
+    """Return the campaign that a certificate holds. Raises StudyError where its scenario is not the one it names."""
     settings = dict(document["scenario"])
     name = str(settings.pop("name"))
     if scenario is None:

@@ -1,4 +1,4 @@
-"""Verbs evolve, harden, tune and certify: search for parameters, make them safer, and bound their risks."""
+"""Verbs evolve, harden, tune, certify and why: search for parameters, make them safer, bound and explain risks."""
 
 import time
 from functools import partial
@@ -273,6 +273,35 @@ def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
     with run_progress(o.json) as watch:
         result = certificates.fly_campaign(campaign, folder, seconds, watch, resume=o.resume, **also)
     return _end(result, o.out, o.plot, o.json)
+
+
+@verb(PANEL, "airflock.why", "settings law trust threads quiet plot json")
+def why(o: SimpleNamespace, errors: ErrorCollector) -> None:
+    """Say why two agents met in a flight: futures branch off before it, each without one thing.
+
+    --plot draws the probability of the event over the time before it, one line for each thing taken away.
+
+    Example: airflock why vasarhelyi_2018/real_4ms --seed 1001 --plot why.png
+    """
+    from airflock.certificates import HitCauses, why
+    from airflock.view import plot_why
+
+    errors.read(options.check_writable, (o.plot, PICTURES), reads=[o.scenario])
+    settings = errors.read(options.parse_settings, o.settings)
+    seconds = None if o.budget is None else errors.read(options.parse_seconds, o.budget)
+    leads = o.leads and errors.collect_each(partial(options.parse_seconds, option="--leads"), o.leads.split(","))
+    errors.raise_errors()
+    how = {name: getattr(o, name) for name in ("event", "limit", "futures", "threads", "law", "trust")}
+    with progress_line(o.quiet or o.json) as line:
+        found = why(
+            o.scenario, o.seed, leads=leads, budget=seconds, settings=settings, interventions=o.interventions or None,
+            say=lambda text: line.update(text), **how,
+        )  # fmt: skip
+    if o.plot is not None:
+        if isinstance(found, HitCauses):
+            raise ScenarioError(["--plot: draws one flight of a certificate; name it with --seed"])
+        terminal.save_picture(plot_why(found), o.plot)
+    terminal.print_result(found, o.json)
 
 
 def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:

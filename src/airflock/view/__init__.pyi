@@ -33,6 +33,7 @@ from .result_plots import (
     plot_certificate as plot_certificate,
     plot_identified as plot_identified,
     plot_inferred as plot_inferred,
+    plot_why as plot_why,
     stood as stood,
 )
 from .scene import (

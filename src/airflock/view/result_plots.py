@@ -20,7 +20,7 @@ from airflock.view import style
 from airflock.view.flight_paths import scenario_or_none, short_name, title_details
 
 if TYPE_CHECKING:
-    from airflock.certificates import Certificate
+    from airflock.certificates import Certificate, WhyResult
 
 
 def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> Figure:
@@ -42,6 +42,25 @@ def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> F
     verdict = "shown" if certificate.shown else "not shown"
     details = f"{verdict}, {100.0 * certificate.campaign.confidence:g} % confidence"
     return style.set_figure_title(figure, certificate.campaign.scenario.name, details)
+
+
+def plot_why(why: "WhyResult", *, ax: Axes | None = None) -> Figure:
+    """Plot the probability of the event over the time before it, one line for each thing taken away; bars: 95 %."""
+    figure, axes = style.figure_and_axes(ax, 5.0, 3.2)
+    for number, name in enumerate(dict.fromkeys(row.without for row in why.rows)):
+        rows = sorted((row for row in why.rows if row.without == name), key=lambda row: row.lead)
+        shares = np.array([row.share for row in rows])
+        bars = np.abs(np.array([[row.low for row in rows], [row.high for row in rows]]) - shares)
+        color = style.LINE_COLOURS[number % len(style.LINE_COLOURS)]
+        axes.errorbar(
+            [row.lead for row in rows], shares, bars, fmt="o-", ms=3, lw=1.2, color=color, label=why.change(name)
+        )
+    axes.set_ylim(-0.03, 1.03)
+    axes.invert_xaxis()  # time runs to the right
+    style.style_axes(axes, "time before the event (s)", "probability of the event")
+    style.add_legend(axes, columns=2)
+    style.set_title(axes, why.scenario.name, why.event)
+    return style.root_figure(figure)
 
 
 def _bounds(axes: Axes, certificate: "Certificate") -> None:
