@@ -1,4 +1,5 @@
 # What a type checker, an editor and `lazy_loader` read: each public name stands here once.
+from .certificates.attack import attack as attack
 from .certificates.causes import why as why
 from .certificates.certification import certify as certify
 from .check.models import check_model as check_model, check_types as check_types

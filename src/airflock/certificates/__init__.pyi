@@ -1,4 +1,8 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
+from .attack import (
+    AttackResult as AttackResult,
+    attack as attack,
+)
 from .campaign import (
     Campaign as Campaign,
     campaign_from_request as campaign_from_request,

@@ -366,7 +366,7 @@ class _FlownFlight:
         return flight.advance(steps=until) if until else flight
 
 
-def _measured(scenario: Scenario, limit: float | None) -> Scenario:
+def measured_by_contacts(scenario: Scenario, limit: float | None) -> Scenario:
     """Return the scenario measured by collisions and contacts at every step: metrics do not change a flight."""
     radius = {} if limit is None else {"metrics.r_coll": float(limit)}
     return scenario_variant(scenario, {"metrics.kind": "contacts"} | radius)
@@ -534,7 +534,7 @@ def _hits(source: Certificate | Path, trust: bool) -> tuple[str, list[tuple[_Flo
             notes.append(f"limit {limit.event}: left out, as it has no moment that could be explained")
             continue
         flown = with_parameters(campaign.scenario, campaign.parameters(own))
-        measured = _measured(flown, limit.value if limit.score == "r_min" else None)
+        measured = measured_by_contacts(flown, limit.value if limit.score == "r_min" else None)
         hits.setdefault((own, event), _FlownFlight(measured, own, campaign.bits, campaign.device))
     if not hits:
         raise FlightError("; ".join([f"{campaign.scenario.name}: nothing to explain: no flight has an event", *notes]))
@@ -562,10 +562,8 @@ def _survey(name: str, hits: Sequence[tuple[_FlownFlight, str]], notes: list[str
     return HitCauses(name, tuple(flights), tuple(dict.fromkeys(notes)))
 
 
-def _check_arguments(
-    event: str, limit: float | None, leads: Sequence[float], futures: int, budget: float | None
-) -> None:
-    """Refuse what cannot be flown, one line each."""
+def check_event(event: str, limit: float | None) -> None:
+    """Refuse an event that is unknown, and a limit that it does not have."""
     errors = ErrorCollector()
     if event not in EVENTS:
         errors.note(f"event = {event!r}: {suggest(event, EVENTS, 'known: ' + ', '.join(EVENTS))}")
@@ -573,6 +571,15 @@ def _check_arguments(
         errors.note(f"limit = {limit!r} m lies outside (0, 1000] m; 3.0 is usual")
     if limit is not None and event == "world":
         errors.note("limit: is that of a pair; metrics.r_body says how near the world an agent touches it")
+    errors.raise_errors()
+
+
+def _check_arguments(
+    event: str, limit: float | None, leads: Sequence[float], futures: int, budget: float | None
+) -> None:
+    """Refuse what cannot be flown, one line each."""
+    errors = ErrorCollector()
+    errors.read(check_event, event, limit)
     usable = not isinstance(leads, str) and isinstance(leads, Sequence) and len(leads)
     if not usable or not all(is_number(lead) and 0.0 < lead <= 1e6 for lead in leads):
         errors.note(f"leads = {leads!r} is no list of times within (0, 1e6] s, such as [8.0, 4.0, 2.0]")
@@ -593,7 +600,7 @@ def _flown_flight(
         if seed is None:
             raise ScenarioError(["seed: is needed to fly the flight again, such as why(scenario, seed=7)"])
         scenario = scenario_variant(given, settings, law, trust=trust)
-        return _FlownFlight(_measured(scenario, limit), check_seed(seed))
+        return _FlownFlight(measured_by_contacts(scenario, limit), check_seed(seed))
     if seed is not None:
         raise ScenarioError([f"seed = {seed}: a recording holds the seed of its flight; leave it out"])
     scenario = scenario_to_fly_again(given, law, settings, trust=trust)
@@ -608,7 +615,7 @@ def _flown_flight(
         events += [Event(event.step, event.kind, data)] if data or not event.data else []
     bits = attributes.read_integer(given, "airflock_precision", 32)
     device, own = str(given.attrs.get("airflock_device", "cpu")), attributes.read_integer(given, "airflock_seed")
-    return _FlownFlight(_measured(scenario, limit), own, bits, device, tuple(events))
+    return _FlownFlight(measured_by_contacts(scenario, limit), own, bits, device, tuple(events))
 
 
 def _first_event(flown: _FlownFlight, event: str) -> tuple[int, float, tuple[int, ...], str]:
@@ -771,7 +778,7 @@ class _Ensembles:
         return CauseRow(lead * self.flown.scenario.flight.dt, name, events, self.futures, low, high, p_value)
 
     def _together(self, rows: Sequence[CauseRow]) -> list[CauseRow]:
-        """Take further causes of one lead away with the strongest one while events are left: a smallest set, greedily."""
+        """Take further causes of a lead away with the strongest one while events are left: a smallest set."""
         named = sorted((row for row in rows if row.is_named), key=lambda row: row.events)
         if not named:
             return []

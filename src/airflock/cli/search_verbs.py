@@ -304,6 +304,34 @@ def why(o: SimpleNamespace, errors: ErrorCollector) -> None:
     terminal.print_result(found, o.json)
 
 
+@verb(PANEL, "airflock.attack", "settings law trust agents duration threads quiet out json")
+def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
+    """Find the smallest disturbance that breaks a flock: who, when, how long, which way and how much.
+
+    --out writes a scenario for each kind, which flies it: for several kinds FILE_gnss_offset.toml and so on. Fly it,
+    evolve or harden against it, certify it.
+
+    Example: airflock attack vasarhelyi_2018/real_6ms --kinds gnss_offset,wind --budget 2min --out broken.toml
+    """
+    from airflock.certificates import attack
+
+    kinds = o.kinds.split(",")
+    places = {kind: o.out.with_stem(f"{o.out.stem}_{kind}") if kinds[1:] else o.out for kind in kinds if o.out}
+    errors.read(options.check_writable, *((place, SCENARIOS) for place in places.values()), reads=[o.scenario])
+    seconds = errors.read(options.parse_seconds, o.budget)
+    settings = options.collect_settings(errors, o)
+    scenario = options.collect_scenario(errors, o.scenario, settings, o.law, trust=o.trust)
+    errors.raise_errors()
+    terminal.print_notes(scenario.notes)
+    how = {name: getattr(o, name) for name in ("event", "limit", "probability", "threads")}
+    with progress_line(o.quiet or o.json) as line:
+        found = attack(scenario, kinds, budget=seconds, say=lambda text: line.update(text), **how)
+    terminal.print_result(found, o.json)
+    for row in found.rows if o.out else ():
+        seed = "" if row.seed is None else f"; airflock replay {places[row.kind]} --seed {row.seed}"
+        terminal.print_message(f"saved {found.save(places[row.kind], row.kind)}{seed}")
+
+
 def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
     """Write, print, and exit with status 1 where something is not shown."""
     if out is not None:
