@@ -1,7 +1,7 @@
 # What a type checker, an editor and `lazy_loader` read: each public name stands here once.
-from .certificates.attack import attack as attack
 from .certificates.causes import why as why
 from .certificates.certification import certify as certify
+from .certificates.disturbances import attack as attack
 from .check.models import check_model as check_model, check_types as check_types
 from .check.parts import (
     check_body as check_body,

@@ -1,8 +1,4 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from .attack import (
-    AttackResult as AttackResult,
-    attack as attack,
-)
 from .campaign import (
     Campaign as Campaign,
     campaign_from_request as campaign_from_request,
@@ -33,6 +29,10 @@ from .certification import (
 from .counting import (
     COUNT_BATCH as COUNT_BATCH,
     flights_to_show as flights_to_show,
+)
+from .disturbances import (
+    AttackResult as AttackResult,
+    attack as attack,
 )
 from .limits import (
     EventLimit as EventLimit,

@@ -316,7 +316,8 @@ def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
     from airflock.certificates import attack
 
     kinds = o.kinds.split(",")
-    places = {kind: o.out.with_stem(f"{o.out.stem}_{kind}") if kinds[1:] else o.out for kind in kinds if o.out}
+    names = [kind.partition("=")[0].strip() for kind in kinds]
+    places = {name: o.out.with_stem(f"{o.out.stem}_{name}") if names[1:] else o.out for name in names if o.out}
     errors.read(options.check_writable, *((place, SCENARIOS) for place in places.values()), reads=[o.scenario])
     seconds = errors.read(options.parse_seconds, o.budget)
     settings = options.collect_settings(errors, o)

@@ -11,7 +11,7 @@ as the best of many candidates looks better on the seeds that chose it than it i
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from os import PathLike
 from typing import Any, NamedTuple
@@ -32,7 +32,8 @@ from airflock.support import (
     FlightError,
     ScenarioError,
     expand_path,
-    format_cell,
+    is_number,
+    parse_toml_value,
     result_group,
     result_table,
     run_in_threads,
@@ -105,25 +106,30 @@ def begin_of(scenario: Scenario, moment: int) -> float:
     return round(share * scenario.flight.duration / scenario.flight.dt) * scenario.flight.dt
 
 
-def disturbance(kind: str, scenario: Scenario) -> Disturbance:
-    """Return how the dose of a kind is given. Raises ScenarioError for one that the scenario cannot suffer."""
+def disturbance(text: str, scenario: Scenario) -> Disturbance:
+    """Return how the dose of a kind is given, KIND or KIND=LARGEST. Raises ScenarioError where that cannot be flown."""
+    kind, equals, largest = (part.strip() for part in text.partition("="))
+    known = {} if kind not in FAULTS else {name: how for name, how, _ in declarations(FAULTS[kind].Parameters)}
+    pairs = (("east", "north"), ("share",))
+    names = next((each for each in pairs if {*each} <= {*known}), tuple(known)[:1])
+    how: Any = known[names[0]] if names else None
     if kind == WIND:
-        made = Disturbance(kind, "m/s", WIND_MOST, ("east", "north"))
+        made = Disturbance(kind, "m/s", WIND_MOST, pairs[0])
     elif kind not in FAULTS:
         hint = suggest(kind, [WIND, *FAULTS], f"known: {WIND}, {', '.join(FAULTS)}")
         raise ScenarioError([f"kinds: {kind}: unknown; {hint}"])
     elif FAULTS[kind].leaves is not None:
         raise ScenarioError([f"kinds: {kind}: an agent that drops out has no dose; add the fault to the scenario"])
+    elif how is None:
+        made = Disturbance(kind, "s", 0.5 * scenario.flight.duration)
     else:
-        known = {name: how for name, how, _ in declarations(FAULTS[kind].Parameters)}
-        pairs = (("east", "north"), ("share",))
-        names = next((each for each in pairs if {*each} <= {*known}), tuple(known)[:1])
-        how: Any = known[names[0]] if names else None
-        if how is None:
-            made = Disturbance(kind, "s", 0.5 * scenario.flight.duration)
-        else:
-            most = 1.0 if names == ("share",) else float((how.usual or (0.0, how.high))[1])
-            made = Disturbance(kind, how.unit, most, names)
+        most = 1.0 if names == ("share",) else float((how.usual or (0.0, how.high))[1])
+        made = Disturbance(kind, how.unit, most, names)
+    if equals:
+        most = parse_toml_value(largest)
+        if not is_number(most) or not 0.0 < most <= (how.high if names and kind != WIND else 1e3):
+            raise ScenarioError([f"kinds: {text}: {largest} is no largest dose in {made.unit}; {made.most:g} is usual"])
+        made = replace(made, most=float(most))
     try:
         scenario_variant(scenario, made.settings(scenario, Candidate(0, 0, 1.0, 0.0), made.most))
     except ScenarioError as error:
@@ -248,15 +254,19 @@ class AttackResult:
 
     def __rich__(self) -> Any:
         """Return sentences, table and notes, for a terminal."""
+
+        def shown(value: float) -> str:
+            return f"{value:.3g}" if math.isfinite(value) else "none"
+
         cells = []
         for row in self.rows:
-            doses = [f"{value:.3g}" if math.isfinite(value) else "none" for value in (row.dose, row.low, row.high)]
-            who = "all" if row.agent is None else str(row.agent)
-            way = f"{row.direction:.0f}" if math.isfinite(row.direction) else ""
-            times = [format_cell(row.at), format_cell(row.lasts)]
-            cells.append((row.kind, row.unit, *doses, f"{row.share:.0%}", who, *times, way, f"{row.flights:.0f}"))
-        heads = "kind; unit; >dose; >at least; >at most; >broken; >agent; >from, s; >for, s; >towards, deg; >flights"
-        title = f"smallest dose with the event in {self.probability:.0%} of flights (95 %)"
+            who = "all" if row.agent is None else f"agent {row.agent}"
+            way = f" towards {row.direction:.0f}°" if math.isfinite(row.direction) else ""
+            how = f"{who}{way}, {row.at:.0f} to {row.at + row.lasts:.0f} s"
+            span = f"{shown(row.low)} to {shown(row.high)}"
+            cells.append((row.kind, row.unit, shown(row.dose), span, f"{row.share:.0%}", how, f"{row.flights:.0f}"))
+        title = f"smallest dose with the event in {self.probability:.0%} of flights"
+        heads = "kind; unit; >dose; >95 %; >broken; disturbance; >flights"
         return result_group(self.text, result_table(title, heads, cells), *self.notes)
 
 
@@ -281,8 +291,9 @@ def attack(
     scenario : Scenario, str or path (PRESET|FILE)
         What is flown. Its flights should be safe: those with the event are no start of a search.
     kinds : sequence of str (KIND,KIND)
-        Kinds of faults of one agent, such as gnss_offset or motor, or wind, which all have in the whole flight. The
-        dose is the length of the vector, the share that is lost, or how long a fault without numbers lasts.
+        Kinds of faults of one agent, such as gnss_offset or motor, or wind, which all have in the whole flight; with
+        the largest dose to try, such as gnss_offset=8. The dose is the length of the vector, the share that is lost,
+        or how long a fault without numbers lasts.
     event : {"pair", "world"}
         pair: two agents nearer than `limit`; world: an agent touches a wall, an obstacle or the scene.
     limit : float, optional
