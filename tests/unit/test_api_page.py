@@ -111,6 +111,7 @@ QUIET = {  # raise none of ours: neither their source nor their docstring shows 
     "airflock.search.study_result.EvolveResult.document", "airflock.certificates.causes.WhyResult.document",
     "airflock.certificates.causes.WhyResult.text", "airflock.certificates.causes.WhyResult.table",
     "airflock.certificates.causes.WhyResult.causes", "airflock.certificates.causes.WhyResult.avoidable_until",
+    "airflock.certificates.causes.HitCauses.document", "airflock.certificates.disturbances.AttackResult.document",
 }  # fmt: skip
 
 

@@ -336,7 +336,17 @@ class HitCauses:
         return f"Flights with an event, by cause: {', '.join([*said, *lone])}."
 
     def document(self) -> dict[str, Any]:
-        """Return the result as plain values, for JSON."""
+        """Return the result as plain values, for JSON.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> close = {"agents": 5, "duration": 20.0, "model.p_rep": 0.0, "world.side": 60.0}
+        >>> certificate = airflock.certify(airflock.load("vasarhelyi_2018/4ms", close), "r_min<3 at 0.1/h", flights=8)
+        >>> found = airflock.why(certificate, futures=10, interventions=["radio.delay"])
+        >>> [row["without"] for row in found.document()["rows"]]
+        ['radio.delay']
+        """
         rows, flights = self.table.to_dict("records"), [flight.document() for flight in self.flights]
         return {"scenario": self.name, "text": self.text, "rows": rows, "flights": flights, "notes": list(self.notes)}
 

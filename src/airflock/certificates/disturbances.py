@@ -9,6 +9,7 @@ as the best of many candidates looks better on the seeds that chose it than it i
 """
 
 import math
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -32,8 +33,6 @@ from airflock.support import (
     FlightError,
     ScenarioError,
     expand_path,
-    is_number,
-    parse_toml_value,
     result_group,
     result_table,
     run_in_threads,
@@ -126,8 +125,8 @@ def disturbance(text: str, scenario: Scenario) -> Disturbance:
         most = 1.0 if names == ("share",) else float((how.usual or (0.0, how.high))[1])
         made = Disturbance(kind, how.unit, most, names)
     if equals:
-        most = parse_toml_value(largest)
-        if not is_number(most) or not 0.0 < most <= (how.high if names and kind != WIND else 1e3):
+        most = float(largest) if re.fullmatch(r"[\d.]+(e-?\d+)?", largest) else math.nan
+        if not 0.0 < most <= (how.high if names and kind != WIND else 1e3):
             raise ScenarioError([f"kinds: {text}: {largest} is no largest dose in {made.unit}; {made.most:g} is usual"])
         made = replace(made, most=float(most))
     try:
@@ -170,7 +169,7 @@ class AttackRow:
 class AttackResult:
     """Which smallest disturbances break a flock.
 
-    scenario : as it was given; event : in words; probability : of the event that counts as broken
+    scenario : as it was given; event : in words; probability : share of flights with the event that counts as broken
     undisturbed : events and flights without any disturbance, on the seeds of judging; rows : one a kind
     """
 
@@ -200,7 +199,9 @@ class AttackResult:
         raise ScenarioError([f"kind = {kind!r}: was not tried; there are {', '.join(row.kind for row in self.rows)}"])
 
     def save(self, path: str | PathLike[str], kind: str) -> Any:
-        """Write a scenario file that flies the disturbance of a kind, and return its path; raises as `attacked`.
+        """Write a scenario file that flies the disturbance of a kind, and return its path.
+
+        Raises ScenarioError for a kind that was not tried.
 
         Examples
         --------
@@ -413,7 +414,10 @@ class _Target:
 
 @dataclass
 class _Search:
-    """Search for the smallest dose of one kind; flown : flights so far, in durations; first : before the first event."""
+    """Search for the smallest dose of one kind.
+
+    flown : flights so far, in durations; first : those before the first event
+    """
 
     target: _Target
     how: Disturbance
