@@ -466,10 +466,14 @@ class _Search:
                 scores[each].append(margin)
                 if margin == 0.0 and self.first is None:
                     self.first = self.flown
-            better = sorted(scores, key=lambda each: (float(np.mean(scores[each])), each))
+            better = sorted(scores, key=lambda each: (self._nearness(scores[each]), each))
             kept = better[: max(ELITES // 2, math.ceil(len(better) / 2))]
             scores = {each: scores[each] for each in kept}
-        return sorted((-float(np.mean(np.equal(m, 0.0))), float(np.mean(m)), each) for each, m in scores.items())
+        return sorted((-float(np.mean(np.equal(m, 0.0))), self._nearness(m), each) for each, m in scores.items())
+
+    def _nearness(self, margins: Sequence[float]) -> float:
+        """Return the mean margin, m, of the share of flights that has to break: how safe the others are is nothing."""
+        return float(np.mean(np.sort(margins)[: math.ceil(self.target.probability * len(margins))]))
 
     def _fly(self, number: int, candidate: Candidate, amount: float) -> tuple[float, float]:
         moment = -1 if self.how.kind == WIND else candidate.moment
