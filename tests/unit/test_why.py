@@ -191,6 +191,8 @@ def test_every_flight_of_a_certificate_with_an_event_is_explained_and_its_plante
     assert len(found.flights) == made.verdicts[0].events > 2
     assert found.causes[0] == "radio_silent (faults[0])" and "radio_silent (faults[0]) in" in found.text
     assert found.document() == airflock.why(made).document()
+    axes = plot_why(found).axes[0]
+    assert [bar.get_width() for bar in axes.patches][::-1] == found.table["named_in"].tolist()
     one = airflock.why(file, found.flights[0].seed, futures=FUTURES, leads=[4.0])
     assert one.event == found.flights[0].event and one.causes[0].without == "faults[0]"
     (tmp_path / "silent_flights").rename(tmp_path / "elsewhere")

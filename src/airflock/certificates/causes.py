@@ -310,15 +310,15 @@ class HitCauses:
         """Return a row for each intervention: flights that name it, its futures with the event and those of nothing."""
         import pandas as pd  # not on top: a flight needs no tables
 
-        shares: dict[str, list[tuple[int, int, int]]] = {}
+        tried: dict[str, list[tuple[int, int, int]]] = {}
         for flight in self.flights:
             named = {part for cause in flight.causes for part in cause.without.split(TOGETHER)}
             for row in (row for row in flight.rows if row.without != NOTHING and TOGETHER not in row.without):
                 bare = next(r.events for r in flight.rows if r.lead == row.lead and r.without == NOTHING)
-                shares.setdefault(flight.label(row.without), []).append((row.without in named, row.events, bare))
-        rows = [(name, *map(sum, zip(*each, strict=True)), len(each)) for name, each in shares.items()]
-        rows.sort(key=lambda row: (-row[1], row[2] - row[3]))
-        return pd.DataFrame(rows, columns=["without", "named_in", "events", "events_of_nothing", "tried_in"])
+                tried.setdefault(flight.label(row.without), []).append((row.without in named, row.events, bare))
+        rows = [(name, *np.sum(each, axis=0).tolist(), len(each)) for name, each in tried.items()]
+        table = pd.DataFrame(rows, columns=["without", "named_in", "events", "events_of_nothing", "tried_in"])
+        return table.sort_values(["named_in", "events"], ascending=[False, True], ignore_index=True)
 
     @property
     def causes(self) -> list[str]:
@@ -554,7 +554,7 @@ def _hits(source: Certificate | Path, trust: bool) -> tuple[str, list[tuple[_Flo
 def _survey(name: str, hits: Sequence[tuple[_FlownFlight, str]], notes: list[str], how: _Request) -> HitCauses:
     """Explain every hit: perturbations and faults alone, so that no flight takes long."""
     ends = np.inf if how.budget is None else time.monotonic() + how.budget
-    flights = []
+    flights: list[WhyResult] = []
     for flown, event in hits:
         if time.monotonic() > ends:
             notes.append(f"budget = {how.budget:g} s was spent: {len(hits) - len(flights)} flights are left out")

@@ -46,12 +46,15 @@ BUDGET = 300.0  # s
 # Seeds of search, choice and judging begin beyond those of studies and people, and below those of certificates.
 SEARCH, CHOICE, JUDGING = (1 << 61, (1 << 61) + (1 << 30), (1 << 61) + (1 << 31))
 SEARCH_FLIGHTS, CHOICE_FLIGHTS, JUDGED_FLIGHTS = 6, 24, 100
-MOMENTS = 16  # at which a disturbance may begin, from a tenth of the flight to eight tenths
-PART = 5.0  # s: a branch ends in the part in which the event happens
+MOMENTS = 16  # at which a disturbance may begin, from a tenth of the flight to its half
+LONGEST = 0.5  # of a flight, that a disturbance can last whenever it begins
+PART = 5.0  # s: a branch ends in the part in which the event happens,
+AFTER = 10.0  # s: or so long after the end of its disturbance
 NO_EVENT = 1e-3  # m: margin of a branch that was measured to be nearer than a limit, and yet has no event
 BATCH = 16  # candidates of a round; a number of its own, so that threads change no result
 ELITES = 8
 PATIENCE = 6  # rounds in which nothing breaks the flock, after which no smaller dose is looked for
+RESTARTS = 6  # times that the search begins anew while no flight at all has had the event
 FRESH = 0.3  # share of candidates that are drawn anew: restarts
 SEARCH_STEP = 1.5  # ratio of two doses of the search
 CURVE_STEP, CURVE = 1.25, range(-5, 6)  # ratio and places of the judged doses, around the one that was found
@@ -83,13 +86,19 @@ class Disturbance:
     most: float
     numbers: tuple[str, ...] = ()
 
+    def time(self, scenario: Scenario, candidate: Candidate, amount: float) -> tuple[float, float]:
+        """Return when a disturbance begins and how long it lasts, s."""
+        if self.kind == WIND:
+            return 0.0, scenario.flight.duration
+        begin = begin_of(scenario, candidate.moment)
+        return begin, candidate.lasts * (scenario.flight.duration - begin) if self.numbers else amount
+
     def settings(self, scenario: Scenario, candidate: Candidate, amount: float) -> Settings:
         """Return the keys of a scenario that is disturbed so."""
         east, north = (amount * turn(candidate.direction) for turn in (math.cos, math.sin))
         if self.kind == WIND:
             return {"wind.east": scenario.wind.east + east, "wind.north": scenario.wind.north + north}
-        begin = begin_of(scenario, candidate.moment)
-        lasts = amount if not self.numbers else candidate.lasts * (scenario.flight.duration - begin)
+        begin, lasts = self.time(scenario, candidate, amount)
         values: Settings = dict(zip(self.numbers, (east, north), strict=False))
         if self.numbers == ("share",):
             values = {"share": 1.0 - amount}
@@ -101,7 +110,7 @@ class Disturbance:
 
 def begin_of(scenario: Scenario, moment: int) -> float:
     """Return when a disturbance begins, s, at a motion step; the start for moment -1."""
-    share = 0.0 if moment < 0 else 0.1 + 0.7 * moment / (MOMENTS - 1)
+    share = 0.0 if moment < 0 else 0.1 + (1.0 - LONGEST - 0.1) * moment / (MOMENTS - 1)
     return round(share * scenario.flight.duration / scenario.flight.dt) * scenario.flight.dt
 
 
@@ -120,13 +129,13 @@ def disturbance(text: str, scenario: Scenario) -> Disturbance:
     elif FAULTS[kind].leaves is not None:
         raise ScenarioError([f"kinds: {kind}: an agent that drops out has no dose; add the fault to the scenario"])
     elif how is None:
-        made = Disturbance(kind, "s", 0.5 * scenario.flight.duration)
+        made = Disturbance(kind, "s", LONGEST * scenario.flight.duration)
     else:
         most = 1.0 if names == ("share",) else float((how.usual or (0.0, how.high))[1])
         made = Disturbance(kind, how.unit, most, names)
     if equals:
         most = float(largest) if re.fullmatch(r"[\d.]+(e-?\d+)?", largest) else math.nan
-        if not 0.0 < most <= (how.high if names and kind != WIND else 1e3):
+        if not 0.0 < most <= (1e3 if kind == WIND else how.high if how is not None else made.most):
             raise ScenarioError([f"kinds: {text}: {largest} is no largest dose in {made.unit}; {made.most:g} is usual"])
         made = replace(made, most=float(most))
     try:
@@ -341,6 +350,8 @@ def attack(
     errors.read(check_event, event, limit)
     if isinstance(kinds, str) or not kinds:
         errors.note(f"kinds = {kinds!r} is no list of names, such as {', '.join(KINDS)}")
+    names = [] if isinstance(kinds, str) else [kind.partition("=")[0].strip() for kind in kinds]
+    errors.add(*(f"kinds: {name}: given {names.count(name)} times" for name in names if names.count(name) > 1))
     if not 0.05 <= probability <= 0.95:
         errors.note(f"probability = {probability:g} lies outside [0.05, 0.95]; {PROBABILITY} is usual")
     if not budget > 0.0:
@@ -348,7 +359,7 @@ def attack(
     errors.raise_errors()
     given = scenario_variant(scenario, settings, law, trust=trust)
     flown = measured_by_contacts(given, limit)
-    chosen = errors.collect_each(lambda kind: disturbance(kind, flown), dict.fromkeys(kinds))
+    chosen = errors.collect_each(lambda kind: disturbance(kind, flown), kinds)
     if event == "pair" and flown.agents < 2:
         errors.note(f"{given.name}: one agent meets nobody; event = 'world' attacks what it touches")
     errors.raise_errors()
@@ -399,11 +410,11 @@ class _Target:
         rows = score_flights([flown] * len(seeds), seeds, threads=self.threads)
         return np.array([row[EVENTS[self.event]] > 0.0 for row in rows])
 
-    def margin(self, number: int, moment: int, settings: Settings) -> tuple[float, float]:
+    def margin(self, number: int, moment: int, settings: Settings, lasts: float) -> tuple[float, float]:
         """Fly one branch; return how near it came to the event, m, 0 where it happened, and how long it took, s."""
         future = self.bases[number, moment].branch().change(settings)
         begin, part = future.time, max(1, round(PART / self.scenario.flight.dt))
-        while not future.over:
+        while not future.over and future.time < begin + lasts + AFTER:
             scores = future.advance(steps=part).scores()
             if scores[EVENTS[self.event]] > 0.0:
                 return 0.0, future.time - begin
@@ -431,7 +442,7 @@ class _Search:
         random, amount, stalled = np.random.default_rng(SEARCH), self.how.most, 0
         elites = self._raced([self._drawn(random, []) for _ in range(BATCH)], amount)
         smallest, candidates, breaks = amount, [each for *_, each in elites], False
-        while stalled < PATIENCE and time.monotonic() < self.ends:
+        while time.monotonic() < self.ends:
             if -elites[0][0] >= self.target.probability:
                 smallest, candidates, breaks, stalled = amount, [each for *_, each in elites], True, 0
                 self.notify(f"{self.how.kind}: {amount:.3g} {self.how.unit} breaks it in the search")
@@ -439,9 +450,15 @@ class _Search:
                 elites = self._raced(candidates, amount)
                 continue
             stalled += 1
-            near = [each for *_, each in elites]
+            if stalled > PATIENCE and (self.first is not None or stalled > PATIENCE * (1 + RESTARTS)):
+                break
+            # Elites in whose neighbourhood nothing happens are dropped, and other places are looked at.
+            stuck, is_quiet = stalled % (PATIENCE + 1) == 0, self.first is None
+            near = [] if stuck else [each for *_, each in elites]
             batch = self._raced([self._drawn(random, near) for _ in range(BATCH)], amount)
-            elites = sorted({*elites, *batch})[:ELITES]
+            elites = sorted({*batch} if stuck else {*elites, *batch})[:ELITES]
+            if is_quiet and self.first is not None:
+                stalled = 0
         return self._judged(smallest, candidates if breaks else [each for *_, each in elites], breaks)
 
     def _drawn(self, random: np.random.Generator, elites: Sequence[Candidate]) -> Candidate:
@@ -478,7 +495,7 @@ class _Search:
     def _fly(self, number: int, candidate: Candidate, amount: float) -> tuple[float, float]:
         moment = -1 if self.how.kind == WIND else candidate.moment
         settings = self.how.settings(self.target.scenario, candidate, amount)
-        return self.target.margin(number, moment, settings)
+        return self.target.margin(number, moment, settings, self.how.time(self.target.scenario, candidate, amount)[1])
 
     def _judged(self, amount: float, candidates: Sequence[Candidate], breaks: bool) -> AttackRow:
         """Choose among candidates by whole flights, and judge doses around `amount` on seeds that chose nothing."""
@@ -507,9 +524,7 @@ class _Search:
         low = max((d for d, *_, high in curve if high < p and d <= dose), default=0.0)
         high = min((d for d, *_, least, _ in curve if least >= p and d >= dose), default=math.inf)
         hits = np.flatnonzero(outcomes[reached])
-        begin = 0.0 if how.kind == WIND else begin_of(target.scenario, best.moment)
-        rest = target.scenario.flight.duration - begin
-        lasts = rest if how.kind == WIND else best.lasts * rest if how.numbers else doses[reached]
+        begin, lasts = how.time(target.scenario, best, doses[reached])
         return AttackRow(
             how.kind, how.unit, dose, low, high, counts[reached] / n, None if how.kind == WIND else best.agent, begin,
             lasts, math.degrees(best.direction) % 360.0 if "east" in how.numbers else math.nan, tuple(curve),

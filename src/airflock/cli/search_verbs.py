@@ -279,13 +279,11 @@ def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
 def why(o: SimpleNamespace, errors: ErrorCollector) -> None:
     """Say why two agents met in a flight: futures branch off before it, each without one thing.
 
-    --plot draws the probability of the event over the time before it, one line for each thing taken away.
+    --plot draws the probability of the event over the time before it, one line for each thing taken away; of a
+    certificate in how many of its flights each is named.
 
     Example: airflock why vasarhelyi_2018/real_4ms --seed 1001 --plot why.png
     """
-    from airflock.certificates import HitCauses, why
-    from airflock.view import plot_why
-
     errors.read(options.check_writable, (o.plot, PICTURES), reads=[o.scenario])
     settings = errors.read(options.parse_settings, o.settings)
     seconds = None if o.budget is None else errors.read(options.parse_seconds, o.budget)
@@ -293,14 +291,12 @@ def why(o: SimpleNamespace, errors: ErrorCollector) -> None:
     errors.raise_errors()
     how = {name: getattr(o, name) for name in ("event", "limit", "futures", "threads", "law", "trust")}
     with progress_line(o.quiet or o.json) as line:
-        found = why(
+        found = certificates.why(
             o.scenario, o.seed, leads=leads, budget=seconds, settings=settings, interventions=o.interventions or None,
             say=lambda text: line.update(text), **how,
         )  # fmt: skip
     if o.plot is not None:
-        if isinstance(found, HitCauses):
-            raise ScenarioError(["--plot: draws one flight of a certificate; name it with --seed"])
-        terminal.save_picture(plot_why(found), o.plot)
+        terminal.save_picture(view.plot_why(found), o.plot)
     terminal.print_result(found, o.json)
 
 
@@ -313,8 +309,6 @@ def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock attack vasarhelyi_2018/real_6ms --kinds gnss_offset,wind --budget 2min --out broken.toml
     """
-    from airflock.certificates import attack
-
     kinds = o.kinds.split(",")
     names = [kind.partition("=")[0].strip() for kind in kinds]
     places = {name: o.out.with_stem(f"{o.out.stem}_{name}") if names[1:] else o.out for name in names if o.out}
@@ -326,7 +320,7 @@ def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
     terminal.print_notes(scenario.notes)
     how = {name: getattr(o, name) for name in ("event", "limit", "probability", "threads")}
     with progress_line(o.quiet or o.json) as line:
-        found = attack(scenario, kinds, budget=seconds, say=lambda text: line.update(text), **how)
+        found = certificates.attack(scenario, kinds, budget=seconds, say=lambda text: line.update(text), **how)
     terminal.print_result(found, o.json)
     for row in found.rows if o.out else ():
         seed = "" if row.seed is None else f"; airflock replay {places[row.kind]} --seed {row.seed}"

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
+from airflock import certificates
 from airflock.displays import Show
 from airflock.estimate import FlightLogs, IdentifyResult, InferResult, LogCheck
 from airflock.parts.bodies import held
@@ -20,7 +21,7 @@ from airflock.view import style
 from airflock.view.flight_paths import scenario_or_none, short_name, title_details
 
 if TYPE_CHECKING:
-    from airflock.certificates import Certificate, WhyResult
+    from airflock.certificates import Certificate
 
 
 def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> Figure:
@@ -44,9 +45,18 @@ def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> F
     return style.set_figure_title(figure, certificate.campaign.scenario.name, details)
 
 
-def plot_why(why: "WhyResult", *, ax: Axes | None = None) -> Figure:
-    """Plot the probability of the event over the time before it, one line for each thing taken away; bars: 95 %."""
+def plot_why(why: "certificates.WhyResult | certificates.HitCauses", *, ax: Axes | None = None) -> Figure:
+    """Plot the probability of the event over the time before it, one line for each thing taken away; bars: 95 %.
+
+    Of the flights of a certificate: in how many of them each is named.
+    """
     figure, axes = style.figure_and_axes(ax, 5.0, 3.2)
+    if isinstance(why, certificates.HitCauses):
+        table = why.table[::-1]
+        axes.barh(table["without"], table["named_in"], height=0.6, color=style.BLUE)
+        style.style_axes(axes, f"flights that name it, of {len(why.flights)} with an event")
+        style.set_title(axes, why.name)
+        return style.root_figure(figure)
     for number, name in enumerate(dict.fromkeys(row.without for row in why.rows)):
         rows = sorted((row for row in why.rows if row.without == name), key=lambda row: row.lead)
         shares = np.array([row.share for row in rows])
