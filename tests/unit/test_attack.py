@@ -124,12 +124,17 @@ def test_threads_change_no_result(broken):
 def test_the_command_writes_a_scenario_that_flies_the_disturbance(tmp_path):
     keys = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
     out = tmp_path / "broken.toml"
-    done = called("attack", "vasarhelyi_2018/4ms", "--kinds", "gnss_offset, motor", "--budget", "1s", "--limit", "3",
+    done = called("attack", "vasarhelyi_2018/4ms", "--kinds", "gnss_offset, motor", "--budget", "20s", "--limit", "3",
                   "--json", "--out", out, *keys)  # fmt: skip
     assert done.returncode == 0, done.stderr
     rows = json.loads(done.stdout)["rows"]
+    assert {row["kind"] for row in rows} == {"gnss_offset", "motor"}
     for row in rows:
-        flown = airflock.load(tmp_path / f"broken_{row['kind']}.toml")
+        file = tmp_path / f"broken_{row['kind']}.toml"
+        assert file.is_file() == (row["dose"] is not None)  # what breaks nothing flies no file
+        if not file.is_file():
+            continue
+        flown = airflock.load(file)
         assert flown.faults[0].fault.name == row["kind"] and flown.faults[0].agents[0] == row["agent"]
 
 

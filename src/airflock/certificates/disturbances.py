@@ -273,7 +273,7 @@ class AttackResult:
             who = "all" if row.agent is None else f"agent {row.agent}"
             way = f" towards {row.direction:.0f}°" if math.isfinite(row.direction) else ""
             how = f"{who}{way}, {row.at:.0f} to {row.at + row.lasts:.0f} s"
-            span = f"{shown(row.low)} to {shown(row.high)}"
+            span = f"{shown(row.low)} to {shown(row.high)}" if math.isfinite(row.dose) else f"above {shown(row.low)}"
             cells.append((row.kind, row.unit, shown(row.dose), span, f"{row.share:.0%}", how, f"{row.flights:.0f}"))
         title = f"smallest dose with the event in {self.probability:.0%} of flights"
         heads = "kind; unit; >dose; >95 %; >broken; disturbance; >flights"

@@ -1,5 +1,6 @@
 """Verbs evolve, harden, tune, certify and why: search for parameters, make them safer, bound and explain risks."""
 
+import math
 import time
 from functools import partial
 from pathlib import Path
@@ -304,8 +305,8 @@ def why(o: SimpleNamespace, errors: ErrorCollector) -> None:
 def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
     """Find the smallest disturbance that breaks a flock: who, when, how long, which way and how much.
 
-    --out writes a scenario for each kind, which flies it: for several kinds FILE_gnss_offset.toml and so on. Fly it,
-    evolve or harden against it, certify it.
+    --out writes a scenario for each kind that breaks it, which flies the disturbance: for several kinds
+    FILE_gnss_offset.toml and so on. Replay it, evolve or harden against it, certify it.
 
     Example: airflock attack vasarhelyi_2018/real_6ms --kinds gnss_offset,wind --budget 2min --out broken.toml
     """
@@ -322,7 +323,7 @@ def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
     with progress_line(o.quiet or o.json) as line:
         found = certificates.attack(scenario, kinds, budget=seconds, say=lambda text: line.update(text), **how)
     terminal.print_result(found, o.json)
-    for row in found.rows if o.out else ():
+    for row in (row for row in found.rows if o.out and math.isfinite(row.dose)):
         seed = "" if row.seed is None else f"; airflock replay {places[row.kind]} --seed {row.seed}"
         terminal.print_message(f"saved {found.save(places[row.kind], row.kind)}{seed}")
 
