@@ -142,7 +142,8 @@ def test_faulty_requests_are_refused_in_a_line():
     scenario = small()
     lines = {
         "kinds: gnss_ofset: unknown; did you mean gnss_offset": lambda: airflock.attack(scenario, ["gnss_ofset"]),
-        "kinds = 'wind' is no list of names, such as gnss_offset": lambda: airflock.attack(scenario, "wind"),
+        "kinds: names none; gnss_offset,": lambda: airflock.attack(scenario, []),
+        "kinds: stuk: unknown; did you mean stuck": lambda: airflock.attack(scenario, "wind, stuk"),
         "kinds: fails: an agent that drops out has no dose": lambda: airflock.attack(scenario, ["fails"]),
         "kinds: motor=7: 7 is no largest dose in 1; 1 is usual": lambda: airflock.attack(scenario, ["motor=7"]),
         "kinds: wind=much: much is no largest dose in m/s": lambda: airflock.attack(scenario, ["wind=much"]),

@@ -33,6 +33,7 @@ from airflock.support import (
     FlightError,
     ScenarioError,
     expand_path,
+    log,
     result_group,
     result_table,
     run_in_threads,
@@ -40,7 +41,7 @@ from airflock.support import (
 )
 
 WIND = "wind"
-KINDS = ("gnss_offset", "gnss_drift", "radio_silent", "pretender", "wind")
+KINDS = "gnss_offset,gnss_drift,radio_silent,pretender,wind"
 PROBABILITY = 0.5
 BUDGET = 300.0  # s
 # Seeds of search, choice and judging begin beyond those of studies and people, and below those of certificates.
@@ -282,7 +283,7 @@ class AttackResult:
 
 def attack(
     scenario: Scenario | str | PathLike[str],
-    kinds: Sequence[str] = KINDS,
+    kinds: str | Sequence[str] = KINDS,
     *,
     event: str = "pair",
     limit: float | None = None,
@@ -292,7 +293,7 @@ def attack(
     settings: Mapping[str, Any] | None = None,
     law: Any = None,
     trust: bool = False,
-    say: Callable[[str], None] | None = None,
+    say: Callable[[str], None] = log,
 ) -> AttackResult:
     """Find the smallest disturbance that breaks a flock: who, when, how long, which way and how much.
 
@@ -300,7 +301,7 @@ def attack(
     ----------
     scenario : Scenario, str or path (PRESET|FILE)
         What is flown. Its flights should be safe: those with the event are no start of a search.
-    kinds : sequence of str (KIND,KIND)
+    kinds : str or sequence of str (KIND,KIND)
         Kinds of faults of one agent, such as gnss_offset or motor, or wind, which all have in the whole flight; with
         the largest dose to try, such as gnss_offset=8. The dose is the length of the vector, the share that is lost,
         or how long a fault without numbers lasts.
@@ -320,7 +321,7 @@ def attack(
         A law of the user's own, as `airflock.load` takes it.
     trust : bool
         Whether code that files name may run.
-    say : callable, optional
+    say : callable
         Called with a line now and then.
 
     Returns
@@ -348,9 +349,9 @@ def attack(
     """
     errors = ErrorCollector()
     errors.read(check_event, event, limit)
-    if isinstance(kinds, str) or not kinds:
-        errors.note(f"kinds = {kinds!r} is no list of names, such as {', '.join(KINDS)}")
-    names = [] if isinstance(kinds, str) else [kind.partition("=")[0].strip() for kind in kinds]
+    kinds = kinds.split(",") if isinstance(kinds, str) else kinds
+    names = [kind.partition("=")[0].strip() for kind in kinds]
+    errors.add(*(["kinds: names none; " + KINDS + " are usual"] if not names else []))
     errors.add(*(f"kinds: {name}: given {names.count(name)} times" for name in names if names.count(name) > 1))
     if not 0.05 <= probability <= 0.95:
         errors.note(f"probability = {probability:g} lies outside [0.05, 0.95]; {PROBABILITY} is usual")
@@ -363,14 +364,13 @@ def attack(
     if event == "pair" and flown.agents < 2:
         errors.note(f"{given.name}: one agent meets nobody; event = 'world' attacks what it touches")
     errors.raise_errors()
-    notify = say or (lambda line: None)
     target = _Target(flown, event, probability, threads)
     target.fly_bases()
     bare = target.events({}, range(JUDGING, JUDGING + JUDGED_FLIGHTS))
     rows = []
     for kind in chosen:
-        row = _Search(target, kind, time.monotonic() + budget / len(chosen), notify).run()
-        notify(f"{kind.kind}: judged")
+        row = _Search(target, kind, time.monotonic() + budget / len(chosen), say).run()
+        say(f"{kind.kind}: judged")
         rows.append(row)
     near = f"Two agents within {flown.metrics.r_coll:g} m"
     near = near if event == "pair" else "An agent touches a wall, an obstacle or the scene"

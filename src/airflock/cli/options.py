@@ -326,7 +326,6 @@ ALIASES = (
     Alias("identify", "conservative uncertain", "airflock.estimate.IdentifyResult.document"),
     Alias("identify", "plan", "airflock.estimate.flight_card", FLAG),
     Alias("infer", "models topologies", "", {"kind": str}),
-    Alias("attack", "kinds", "", {"kind": str}),
     Alias("fleet", "beside", "", {"kind": str, "default": None, "spelled": ("--against",), "metavar": "simulator"}),
     Alias("paper", "quick breaks", "", {"is_negatable": True}),
     Alias("keys", "schema", "airflock.scenarios.keys.json_schema", FLAG),

@@ -310,8 +310,7 @@ def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
 
     Example: airflock attack vasarhelyi_2018/real_6ms --kinds gnss_offset,wind --budget 2min --out broken.toml
     """
-    kinds = o.kinds.split(",")
-    names = [kind.partition("=")[0].strip() for kind in kinds]
+    names = [kind.partition("=")[0].strip() for kind in o.kinds.split(",")]
     places = {name: o.out.with_stem(f"{o.out.stem}_{name}") if names[1:] else o.out for name in names if o.out}
     errors.read(options.check_writable, *((place, SCENARIOS) for place in places.values()), reads=[o.scenario])
     seconds = errors.read(options.parse_seconds, o.budget)
@@ -321,7 +320,7 @@ def attack(o: SimpleNamespace, errors: ErrorCollector) -> None:
     terminal.print_notes(scenario.notes)
     how = {name: getattr(o, name) for name in ("event", "limit", "probability", "threads")}
     with progress_line(o.quiet or o.json) as line:
-        found = certificates.attack(scenario, kinds, budget=seconds, say=lambda text: line.update(text), **how)
+        found = certificates.attack(scenario, o.kinds, budget=seconds, say=lambda text: line.update(text), **how)
     terminal.print_result(found, o.json)
     for row in (row for row in found.rows if o.out and math.isfinite(row.dose)):
         seed = "" if row.seed is None else f"; airflock replay {places[row.kind]} --seed {row.seed}"
