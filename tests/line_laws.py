@@ -21,7 +21,7 @@ class Line(FitModel):
             else FitParameter(f"model.{name}", -1, "m", 0.0, 1.0, False, defaults[name])
             for name in names
         ]  # fmt: skip
-        self.named, self.speed_index, self.axes, self.spans, self.held = len(names), None, 2, [(0, 0)], frozenset()
+        self.named, self.speed_index, self.axes, self.spans = len(names), None, 2, [(0, 0)]
         self.soft = False
         self.own_speed, self.tracks, self.scale = True, (), None
         flags = {name: defaults[name] for name in usual_numbers}
@@ -50,7 +50,6 @@ class Line(FitModel):
         return getattr(self, "origin", self)
 
     def innovations(self, u, spans=None):
-        u = [n.place(n.default) if k in self.held else x for k, (n, x) in enumerate(zip(self.numbers, u, strict=True))]
         e = self.noise.copy()
         e[:, 0] += self.seen - self.rule(self.input, *u)
         return e, np.zeros(STEPS, np.int64)

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,14 +10,12 @@ import xarray as xr
 import airflock
 from airflock.estimate.inference import (
     fit_checks as predictive,
-    identifiability as ridges,
     innovation_filter as filters,
     law_candidates as candidates,
     law_selection as select,
-    likelihood_fit as search,
-    parametric_bootstrap as bootstrap,
+    likelihood_fit as places,
     parametric_bootstrap as flights,
-    parametric_bootstrap as noise,
+    posterior_sample as search,
 )
 from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter
 from airflock.estimate.inference.law_inference import InferResult, LawResult, judge_laws
@@ -83,9 +80,8 @@ def walkers(agents=10, frames=300, seed=5):
 def brief(monkeypatch):
     """Little searching: enough for two laws of a few numbers."""
     for module, name, value in (
-        (search, "DRAWN", 5), (search, "RACE", ((4, 3), (2, 5))), (search, "SWEEPS", 0), (bootstrap, "ROUNDS", (2, 5)),
-        (flights, "LADDER", (-1.0, 0.0, 1.0)), (bootstrap, "STEPS", 3), (select, "LONG", 6), (ridges, "WORST", 1),
-        (ridges, "WALKED", 1), (noise, "FLOWN", 24),
+        (places, "DRAWN", 5), (search, "SEARCH", 80), (search, "LENGTH", 120), (flights, "ROUNDS", (2, 5)),
+        (flights, "STEPS", 3), (flights, "FLOWN", 24),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
 
@@ -187,52 +183,6 @@ def test_one_compiled_walk_over_all_frames_is_its_text_in_plain_python_and_spans
     assert np.abs(whole.transpose(0, 2, 1)[tracks.state != COUNTED]).max() == 0.0 < np.abs(whole).max()
 
 
-def test_errors_of_perception_alone_move_nobody():
-    """Who turns to the mean of all flies alike however blurred the places; a small radius takes others in."""
-    tracks = tracks_from_recording(
-        vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0)
-    )
-    (own,), _ = candidates.law_scenarios(["vicsek_1995"], BOX)
-    law = candidates.make_candidate(own, tracks_scale([tracks]), 2)
-    walk, gains = InnovationFilter(law, tracks), FilterGains((1.0, 1.0), (1.0, 1.0), 0.0)
-    kept = np.zeros((len(tracks.seen), 4, tracks.individual_count))
-
-    def apart(radius, blur):
-        numbers = {n.column: (NUMBERS | {"model.r": radius})[n.key] for n in law.numbers if n.key in NUMBERS}
-        walk.errors(numbers, gains, SPEED, None, kept)
-        flown = [
-            flights.fly_tracks(
-                walk, (numbers, gains, SPEED), kept, flights.FitNoise(flights.BLURRED, sd, 0.0, 0.0), [0], 1
-            )
-            for sd in (blur, 0.0)
-        ]
-        end = tracks.spans[0][1]
-        return np.abs(tracks.nearest(flown[0].seen[end - 1] - flown[1].seen[end - 1])).max()
-
-    assert apart(2.0 * SIDE, 0.1) < 1e-9
-    assert apart(RADIUS, 0.1) > 1e-3 and apart(RADIUS, 0.0) == 0.0
-
-
-def test_flights_of_the_posterior_check_perceive_with_errors_and_are_not_pushed_by_them():
-    """Metres were flown as metres per second: a flock that turns to the mean of all came apart."""
-    tracks = tracks_from_recording(
-        vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0)
-    )
-    (own,), _ = candidates.law_scenarios(["vicsek_1995"], BOX)
-    law = candidates.make_candidate(own, tracks_scale([tracks]), 2)
-    numbers = {n.column: (NUMBERS | {"model.r": 2.0 * SIDE})[n.key] for n in law.numbers if n.key in NUMBERS}
-    walk, place = InnovationFilter(law, tracks), (numbers, FilterGains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
-    model = SimpleNamespace(filters=[walk], split=lambda _: place)
-    quiet, blurred = (
-        predictive.run_predictive_check(
-            model, None, flights.FitNoise(flights.BLURRED, sd, 0.0, 0.0), 3, lambda: None
-        ).found
-        for sd in (0.0, 0.3)
-    )
-    for name, values in quiet.items():
-        assert blurred[name] == pytest.approx(values, rel=1e-6), name
-
-
 @pytest.mark.parametrize("k", [2, 4, 6])
 def test_the_number_of_nearest_neighbours_that_made_the_tracks_is_the_likeliest(k):
     tracks = tracks_from_recording(vicsek(agents=20, k=k, eta=1.2), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
@@ -281,9 +231,9 @@ def test_an_interval_of_noise_holds_its_own_value_and_what_it_was(seed):
     g = np.random.default_rng(seed)
     value = float(np.exp(g.normal()))
     ends = tuple(float(np.exp(end)) for end in np.log(value) + g.choice([-0.1, 0.0, 0.1], 2))
-    low, high = noise.widened_ends(value, ends, 0.1)
+    low, high = flights.widened_ends(value, ends, 0.1)
     assert low < value < high and low < ends[0] and ends[1] < high, seed
-    assert noise.widened_ends(value, (None, None), 0.1) == (None, None)
+    assert flights.widened_ends(value, (None, None), 0.1) == (None, None)
 
 
 def test_a_scenario_starts_as_wide_as_the_tracks_did():

@@ -192,28 +192,21 @@ def stretch_step(rows, before, i, axes, half, usual, keep, change):  # type: ign
 
 
 def fly_span(  # type: ignore[no-untyped-def]
-    rest, steps, rows, before, start, state, follow, draws, error, pushed, blurred, lasts, wander, axes, half, usual,
+    rest, steps, rows, before, start, state, follow, draws, pushed, wander, axes, half, usual,
     keep, out,
 ):  # fmt: skip
     """Fly freely through the frames of a span from the states of its first frame."""
     for k in range(state.shape[0]):
-        stay, fresh = (lasts, math.sqrt(1.0 - lasts * lasts)) if k > 0 else (0.0, 1.0)
-        # Noise that is no number of the law: pushes of the velocity, or errors of the position by
-        # which everybody decides and from which nobody moves.
+        # Noise that is no number of the law: pushes of the velocity.
         for a in range(axes):
             for i in range(state.shape[1]):
-                error[a, i] = stay * error[a, i] + fresh * blurred * draws[k, a, i]
                 before[a, i], before[axes + a, i] = rows[a, i], rows[axes + a, i]
-                rows[axes + a, i] += pushed * draws[k, axes + a, i]
-                rows[a, i] += error[a, i]
+                rows[axes + a, i] += pushed * draws[k, a, i]
         if k > 0:
             advance((k - 1) * steps, k * steps, 0, *rest)
         for i in range(state.shape[1]):
-            if k > 0:
-                for a in range(axes):
-                    rows[a, i] -= error[a, i]
-                if wander >= 0.0:
-                    stretch_step(rows, before, i, axes, half, usual, keep, wander * draws[k, 2 * axes, i])
+            if k > 0 and wander >= 0.0:
+                stretch_step(rows, before, i, axes, half, usual, keep, wander * draws[k, axes, i])
             # Who enters or is absent follows the record, so that flights have the gaps of the tracks.
             if k == 0 or state[k, i] in (ABSENT, ENTERS):
                 for a in range(2 * axes):
@@ -421,15 +414,8 @@ class FitModel:
         speeds = [i for i, n in enumerate(named) if n.key in ("speed", "body.speed")]
         self.speed_index = speeds[0] if self.own_speed else None
         self.spans = [(t, s) for t, each in enumerate(self.tracks) for s in range(len(each.spans))]
-        self.held: frozenset[int] = frozenset()
         self.soft = False
         self.pool: Sequence[int] = range(len(self.spans))
-
-    def with_fixed(self, numbers: Sequence[int]) -> "FitModel":
-        """Return the model with some numbers fixed at their defaults, whatever the point says."""
-        twin = copy(self)
-        twin.held = frozenset({*self.held, *numbers})
-        return twin
 
     def on(self, pool: Sequence[int]) -> "FitModel":
         """Return the model that sees these spans alone when it is fitted."""
@@ -443,17 +429,6 @@ class FitModel:
         found = FitModel(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale).on(self.pool)
         return found.robust() if self.soft else found
 
-    def with_parameter(self, law: LawCandidate, parameter: FitParameter) -> tuple["FitModel", int]:
-        """Return the model with one more number, and its index; law : with all its numbers, in their order."""
-        assert self.law is not None
-        several = [other for other in law.numbers if other in self.law.numbers or other == parameter]
-        return self.with_parameters(several), several.index(parameter)
-
-    def dropped_parameters(self, law: LawCandidate) -> list[FitParameter]:
-        """Return the numbers of the law that the model does without; law : with all its numbers."""
-        assert self.law is not None
-        return [number for number in law.numbers if number not in self.law.numbers]
-
     def first(self) -> Array:
         """Return the point to begin with: defaults, usual gains, and observed speeds."""
         values = [n.default for n in self.numbers[: self.named]] + list(FIRST_GAINS)
@@ -465,8 +440,8 @@ class FitModel:
         """Return values by column, gains, and the usual speed (m/s) at a point."""
         values = [n.value(float(min(max(x, 0.0), 1.0))) for n, x in zip(self.numbers, u, strict=True)]
         kpa, kva, kpb, kvb, keep = values[self.named :]
-        named = enumerate(zip(self.numbers[: self.named], values, strict=False))
-        by_column = {n.column: v for k, (n, v) in named if n.column >= 0 and k not in self.held}
+        named = zip(self.numbers[: self.named], values, strict=False)
+        by_column = {n.column: v for n, v in named if n.column >= 0}
         usual = values[self.speed_index] if self.speed_index is not None else 0.0
         return by_column, FilterGains((kpa, kva), (kpb, kvb), keep), usual
 

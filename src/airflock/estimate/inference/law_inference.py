@@ -21,7 +21,7 @@ from airflock.estimate.inference.law_candidates import (
     law_scenarios,
     make_candidate,
 )
-from airflock.estimate.inference.likelihood_fit import Fit, with_coordinate
+from airflock.estimate.inference.likelihood_fit import Fit, climb_to_maximum
 from airflock.estimate.inference.observed_tracks import (
     ABSENT,
     SpanTracks,
@@ -31,6 +31,7 @@ from airflock.estimate.inference.observed_tracks import (
     tracks_scale,
 )
 from airflock.estimate.inference.parametric_bootstrap import CorrectedFit, FitNoise, correct_fit
+from airflock.estimate.inference.posterior_sample import sample_posterior
 from airflock.recordings import load_recording, load_tracks
 from airflock.scenarios import CallerParts, Scenario, build_scenario
 from airflock.support import AirflockError, RecordingError, expand_path, interval_lines, result_group, result_table
@@ -319,9 +320,6 @@ def set_parameters(result: InferResult, model: FitModel, corrected: CorrectedFit
         numbers[n.key] = ParameterEstimate(
             n.key, n.value(corrected.place[k]), ends[0], ends[1], n.unit, ends[2], ends[3]
         )
-    for k, n in enumerate(model.numbers[: model.named]):
-        if n.whole:  # no slope leads from one whole number to the next: those that explain the tracks as well
-            numbers[n.key] = _whole_estimate(model, k, result.best.fit)
     noise = corrected.noise
     known = {n.column: (n.key, n.unit) for n in result.best.candidate.noise_parameters}
     if result.best.candidate.body_noise_column >= 0:
@@ -334,19 +332,6 @@ def set_parameters(result: InferResult, model: FitModel, corrected: CorrectedFit
     today = datetime.date.today().isoformat()
     result.settings = {key: number.value for key, number in numbers.items()}
     result.sources = {key: f"infer, {today}: {interval_text(number)}" for key, number in numbers.items()}
-
-
-def _whole_estimate(model: FitModel, index: int, fit: Fit) -> ParameterEstimate:
-    """Return a whole number with the first and last that explain the tracks as well, the others as they are fitted."""
-    from scipy.stats import chi2
-
-    n, spans = model.numbers[index], law_selection.sample_spans(model)
-    values = np.arange(int(n.low), int(n.high))
-    at = [with_coordinate(fit.place, index, n.place(float(value))) for value in values]
-    losses = np.array([model.score(u, spans).loss() for u in at])
-    ends = [values[losses < losses.min() + chi2.ppf(0.95, free) / 2.0][[0, -1]] for free in (1, model.named)]
-    (low, high), (least, most) = (tuple(map(float, each)) for each in ends)
-    return ParameterEstimate(n.key, float(values[losses.argmin()]), low, high, n.unit, least, most)
 
 
 def _low(number: Sought, place: float) -> float | None:
@@ -443,9 +428,9 @@ def infer(
     result, comparison = name_law(tracks, models, settings, topologies, seed=seed, trust=trust, done=done)
     if result.best is not None:
         best, say = result.best, done or (lambda _: None)
-        model = comparison.simplify(best)
+        model, fit, draws = comparison.sample(best)
         teller = _teller(say, f"{best.name}, flown again")
-        corrected = correct_fit(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
+        corrected = correct_fit(model, fit, draws, comparison.spans, teller)
         set_parameters(result, model, corrected)
         if check:
             result.check = run_predictive_check(model, corrected.place, corrected.noise, check, _teller(say, "check"))
@@ -584,22 +569,28 @@ class _Comparison:
         null.deeper(law.name)
         for number, (half, (model, fit)) in enumerate(zip(null.halves, self.fits[law.name], strict=True)):
             own = FitModel(model.law, null.followed, self.scale).on(half)
-            refitted = own, law_selection.polish_fit(own, fit.place)
+            refitted = own, climb_to_maximum(own, fit.place, fit.free, law_selection.sample_spans(own))
             null.fits[law.name][number] = min(null.fits[law.name][number], refitted, key=lambda each: each[1].loss)
         found = null.judged(law.name)
         return found.gain, found.error
 
-    def finish(self, law: LawResult) -> FitModel:
+    def finish(self, law: LawResult) -> None:
         """Fit a law to all spans from what was fitted to the halves, for its numbers, its maps and what it misses."""
-        return self.complete(law, *law_selection.merge_fits(self.laws[law.name], self.fits[law.name]))
+        self.complete(law, *law_selection.merge_fits(self.laws[law.name], self.fits[law.name]))
 
-    def simplify(self, law: LawResult) -> FitModel:
-        """Search the law found on all spans, without numbers that the others compensate for."""
-        say = _teller(self.say, f"{law.name}, simplified")
-        model, fit = law_selection.merge_fits(self.laws[law.name], self.fits[law.name])
-        return self.complete(law, *law_selection.fit_minimal(self.laws[law.name], model, fit, say))
+    def sample(self, law: LawResult) -> tuple[FitModel, Fit, Array]:
+        """Sample the numbers of the law found that are needed, on all spans; return the model, fit and draws."""
+        say = _teller(self.say, f"{law.name}, sampled")
+        plain = FitModel(law.candidate, self.followed, self.scale)
+        whole = plain.robust()
+        fit, draws = sample_posterior(whole, law.fit, self.spans, say)
+        self.complete(law, plain, climb_to_maximum(plain, fit.place, fit.free, self.spans))
+        model, fit = law_selection.drop_redundant(whole, fit, say)
+        if model is not whole:
+            fit, draws = sample_posterior(model, fit, self.spans, say)
+        return model, fit, draws
 
-    def complete(self, law: LawResult, model: FitModel, fit: Fit) -> FitModel:
+    def complete(self, law: LawResult, model: FitModel, fit: Fit) -> None:
         """Enter what a fit to all spans says."""
         assert model.law is not None
         bare = fit.score.loss() + len(fit.free), self.straight.score.loss() + len(self.straight.free)
@@ -608,7 +599,6 @@ class _Comparison:
         law.candidate, law.fit, law.numbers = model.law, fit, _estimates(model, fit)
         law.aic_difference, law.missed = 2.0 * (bare[0] - bare[1]), left / max(gained + left, 1e-9)
         law.maps = force_maps(model, fit.place, self.scale, self.spans)
-        return model
 
 
 def _estimates(model: FitModel, fit: Fit) -> dict[str, ParameterEstimate]:

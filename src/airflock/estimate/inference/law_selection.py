@@ -2,43 +2,32 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.estimate.inference.identifiability import (
-    canonical_model,
-    droppable_parameters,
-    identifiable_indices,
-    restore_parameters,
-)
 from airflock.estimate.inference.innovation_filter import FitModel
 from airflock.estimate.inference.law_candidates import FitParameter, LawCandidate
 from airflock.estimate.inference.likelihood_fit import (
-    CHI2_HALF_95,
-    FINE_SLOPES,
-    MAX_CLIMB_STEPS,
-    WIDE_SLOPES,
     Fit,
     climb_to_maximum,
     draw_points,
+    jacobian,
     loss_at,
-    profile_ranges,
-    race_from_points,
-    scan_ranges,
-    search_modes,
-    settle_fit,
 )
 from airflock.estimate.inference.observed_tracks import SpanTracks, TrackScale
+from airflock.estimate.inference.posterior_sample import search_widely
 
 Array = NDArray[np.float64]
 FOLDS = 4  # parts of the tracks, every other one of which is held out
 ENOUGH = 24_000  # individual steps, and
 FRAMES = (400, 2400)  # least and largest number of frames, on which is fitted
-LONG = 20  # steps of a climb to the end
-ELSEWHERE = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of a number that was given up, beside its default, from which is climbed
-REGAIN = 8  # steps of such a climb
+CHI2_HALF_95 = 1.92  # loss that a number is worth: what 95 % of numbers that are not needed bring at most (Wilks 1938)
+DEPENDENT = 0.2  # share of a slope that other numbers do not explain; below it a number is not identifiable
+EFFECT_POINTS = 6  # best places at which the effect of a number is looked for
+ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where the effect of a number is looked for
+FINE = 0.005  # of a range: step by which numbers are tested for depending on each other
 # One prediction that lost somebody cost 869 units and hid the gain of nine spans of ten; at ten
 # standard deviations a normal density is 1e-22, which nobody believes of a tracker.
 WILD = (1e-3, 20.0)  # share of held-out differences that are wild, and how many times their standard deviation is
@@ -80,16 +69,63 @@ def fit_law(
     gains : of going straight on, to begin with
     """
     model = FitModel(law, tracks, scale).on(pool)
-    begin = draw_points(model, _begin(model, gains), model.few(), seed)
-    kept = identifiable_indices(model, _begin(model, gains), begin, model.few())
+    start = model.first()
+    start[model.named :] = gains
+    begin = draw_points(model, start, model.few(), seed)
+    kept = identifiable_indices(model, begin[:EFFECT_POINTS], model.few())
     on_progress()
+    rest = [*kept, *range(model.named, len(start))]
     model = model.with_parameters([law.numbers[k] for k in kept])
-    fitted = race_from_points(
-        model, _begin(model, gains), begin[:, kept], free_indices(model), model.few(), on_progress
-    )
-    fitted = polish_fit(model, fitted.place)
+    found = search_widely(model, begin[:, rest], free_indices(model), model.few(), seed, on_progress)
+    fitted = climb_to_maximum(model, found.place, free_indices(model), sample_spans(model))
     on_progress()
     return model, fitted
+
+
+def identifiable_indices(model: FitModel, places: Sequence[Array] | Array, spans: Sequence[int]) -> list[int]:
+    """Return indices of the named numbers that tracks can identify, in order; the others stay at their defaults.
+
+    A number is not identifiable if it changes nothing anywhere along its range, such as the limit
+    of a law that has none; or if the earlier numbers explain its slope at all places taken
+    together, such as a mass beside all weights. A radius within which nobody is at these places has
+    no slope, but an effect along its range: kept.
+    """
+    alive = [k for k in range(model.named) if k == model.speed_index or _acts(model, places, k, spans)]
+    flat = np.concatenate([_slopes(model, u, alive, spans) for u in places])
+    kept: list[int] = []
+    basis = np.zeros((len(flat), 0))
+    # Gram-Schmidt in the order of declaration, since authors declare important numbers first: a
+    # column that earlier ones explain is a number that they replace.
+    for column, number in zip(flat.T, alive, strict=True):
+        size = float(np.linalg.norm(column))
+        rest = column - basis @ (basis.T @ column)
+        left = float(np.linalg.norm(rest))
+        if size > 1.0 and left < DEPENDENT * size and number != model.speed_index:
+            continue
+        kept.append(number)
+        if size > 1.0:
+            basis = np.column_stack([basis, rest / max(left, 1e-12)])
+    return kept
+
+
+def _acts(model: FitModel, places: Sequence[Array], index: int, spans: Sequence[int]) -> bool:
+    """Return True if a number changes the loss anywhere along its range."""
+    for u in places:
+        here = model.score(u, spans).loss()
+        for x in ALONG:
+            moved = u.copy()
+            moved[index] = x
+            if abs(model.score(moved, spans).loss() - here) > 1.0:
+                return True
+    return False
+
+
+def _slopes(model: FitModel, u: Array, numbers: Sequence[int], spans: Sequence[int]) -> Array:
+    """Return the slopes of all differences in units of their standard deviations, (difference, number)."""
+    e = model.differences(u, spans)[0]
+    weights = 1.0 / np.sqrt(np.maximum((e**2).mean(axis=0), 1e-30))
+    found: Array = (jacobian(model, u, numbers, spans, FINE, e) * weights[None, :, None]).reshape(-1, len(numbers))
+    return found
 
 
 def merge_fits(law: LawCandidate, fits: Sequence[tuple[FitModel, Fit]]) -> tuple[FitModel, Fit]:
@@ -107,119 +143,38 @@ def merge_fits(law: LawCandidate, fits: Sequence[tuple[FitModel, Fit]]) -> tuple
         for n, x in zip(model.numbers[: model.named], fit.place, strict=False):
             place[whole.numbers.index(n)] = x
         places.append(place)
-    ends = [
-        climb_to_maximum(whole, u, free_indices(whole), sample_spans(whole), slopes=(WIDE_SLOPES, FINE_SLOPES))
-        for u in places
-    ]
+    ends = [climb_to_maximum(whole, u, free_indices(whole), sample_spans(whole)) for u in places]
     return whole, min(ends, key=lambda end: end.loss)
 
 
-def restore_useful(
-    law: LawCandidate, model: FitModel, fitted: Fit, on_progress: Callable[[], None]
-) -> tuple[FitModel, Fit]:
-    """Restore the numbers that were dropped before the search, but explain something at the fit.
+def drop_redundant(model: FitModel, fit: Fit, on_progress: Callable[[], None]) -> tuple[FitModel, Fit]:
+    """Drop numbers without which the tracks are explained as well, the last declared first, since it matters least.
 
-    Before the search, `identifiable` asks at places that explain little; at the fit the answer may
-    differ.
-
-    law : with all its numbers
+    The rest is fitted again from where it is, and from where another number of the same unit takes the part of the
+    one that is dropped, such as one radius that of another.
     """
-    few = model.few()
-    best = climb_to_maximum(model, fitted.place, fitted.free, few, slopes=(WIDE_SLOPES,))
-    for number in model.dropped_parameters(law):
-        fuller, k = model.with_parameter(law, number)
-        places = [np.insert(best.place, k, x) for x in (number.place(number.default), *ELSEWHERE)]
-        places.sort(key=lambda u, fuller=fuller: loss_at(fuller, u, free_indices(fuller), few))  # type: ignore[misc]
-        tried = [
-            climb_to_maximum(fuller, u, free_indices(fuller), few, REGAIN, slopes=(WIDE_SLOPES,)) for u in places[:2]
-        ]
+    spans, lowest = sample_spans(model), fit.loss
+    for k in reversed(range(model.named)):
+        one, rest = model.numbers[k], [f for f in range(len(fit.place)) if f != k]
+        if k == model.speed_index or not (one.key.startswith("model.") or one.default == 0.0):
+            continue  # of the body only what its default switches off
+        without = model.with_parameters([n for n in model.numbers[: model.named] if n != one])
+        starts = [fit.place.copy() for _ in range(model.named)]
+        for f, u in enumerate(starts):
+            if f != k and model.numbers[f].unit == one.unit:
+                u[f] = model.numbers[f].place(one.value(fit.place[k]))
+        unique = list({tuple(u[rest]): u[rest] for u in starts}.values())
+        start = min(unique, key=lambda u: loss_at(without, u, free_indices(without), spans))
+        less = climb_to_maximum(without, start, free_indices(without), spans)
         on_progress()
-        with_it = min(tried, key=lambda each: each.loss)
-        if with_it.loss < best.loss - CHI2_HALF_95:
-            model, best = fuller, with_it
-    if len(model.numbers) == len(fitted.place):
-        return model, fitted
-    return model, polish_fit(model, best.place, LONG)
-
-
-def fit_minimal(
-    law: LawCandidate, model: FitModel, fitted: Fit, on_progress: Callable[[], None]
-) -> tuple[FitModel, Fit]:
-    """Search along each number, then fit with all numbers that explain something and no others.
-
-    law : with all its numbers
-    """
-    model, fitted = fit_canonical(
-        law, *drop_redundant(*restore_useful(law, model, fitted, on_progress), on_progress), on_progress
-    )
-    other = profile_ranges(
-        model,
-        climb_to_maximum(model, fitted.place, fitted.free, model.few(), slopes=(WIDE_SLOPES,)),
-        model.few(),
-        on_progress,
-    )
-    other = settle_fit(
-        model, climb_to_maximum(model, other.place, other.free, sample_spans(model), LONG), sample_spans(model)
-    )
-    fitted = search_modes(
-        model, min(fitted, other, key=lambda each: each.loss), model.few(), sample_spans(model), on_progress
-    )
-    model, fitted = fit_canonical(law, *drop_redundant(model, fitted, on_progress), on_progress)
-    return restore_parameters(law, model, fitted, sample_spans(model), on_progress)
-
-
-def fit_canonical(
-    law: LawCandidate, model: FitModel, fitted: Fit, on_progress: Callable[[], None]
-) -> tuple[FitModel, Fit]:
-    """Fit in terms of the numbers that are declared first, where either of two explains the tracks."""
-    renamed, place = canonical_model(law, model, fitted, on_progress)
-    return (model, fitted) if renamed is model else (renamed, _nearest(renamed, place, place))
-
-
-def drop_redundant(model: FitModel, fitted: Fit, on_progress: Callable[[], None]) -> tuple[FitModel, Fit]:
-    """Drop numbers that the others compensate for, where the rest explains the sample as well."""
-    gone, place, carried = droppable_parameters(model, fitted, on_progress)
-    if not gone:
-        return model, fitted
-    rest = [k for k in range(len(model.numbers)) if k not in gone]
-    assert model.law is not None
-    without = model.with_parameters([n for k, n in enumerate(model.law.numbers) if k not in gone])
-    less = _nearest(without, place[rest], carried[rest])
-    if less.loss >= fitted.loss + 2.0 * len(gone):
-        return model, fitted
-    return without, replace(less, others=tuple(place[rest] for place in fitted.others))
-
-
-def _nearest(model: FitModel, *places: Array) -> Fit:
-    """Return the best of climbs from a point via a few spans, and from another point on the sample at once."""
-    ends = (
-        polish_fit(model, places[0], LONG),
-        climb_to_maximum(model, places[1], free_indices(model), sample_spans(model), LONG),
-    )
-    return min((settle_fit(model, end, sample_spans(model)) for end in ends), key=lambda end: end.loss)
+        if less.loss < lowest + CHI2_HALF_95:
+            model, fit, lowest = without, less, min(lowest, less.loss)
+    return model, fit
 
 
 def free_indices(model: FitModel) -> list[int]:
     """Return numbers that are fitted: all, except the share of own speed that is kept if laws command the speed."""
     return list(range(len(model.numbers) - (0 if model.own_speed else 1)))
-
-
-def polish_fit(model: FitModel, point: Array, steps: int = MAX_CLIMB_STEPS) -> Fit:
-    """Climb on a few spans and on the sample, with a scan of each number's range in between."""
-    few = model.few()
-    rough = climb_to_maximum(model, point, free_indices(model), few, slopes=(WIDE_SLOPES,))
-    for _ in range(3):
-        point, better = scan_ranges(model, rough.place, free_indices(model), few)
-        if not better:
-            break
-        rough = climb_to_maximum(model, point, free_indices(model), few, slopes=(WIDE_SLOPES,))
-    return climb_to_maximum(model, rough.place, free_indices(model), sample_spans(model), steps)
-
-
-def _begin(model: FitModel, gains: Array) -> Array:
-    place = model.first()
-    place[model.named :] = gains
-    return place
 
 
 def make_halves(model: FitModel) -> tuple[list[int], list[int]]:
