@@ -63,7 +63,7 @@ def observe(i: int, others: Iterable[int], flight: FlightView) -> None:
     for a in range(plan.dimensions):
         flock.seen[plan.observed["velocity"][a]][i] = flock.measured_velocity[a][i]
     for a, column in enumerate(plan.observed["goal"]):
-        flock.seen[column][i] = goal_offset(i, a, flock, flight.around.scene, plan=plan)
+        flock.seen[column][i] = goal_offset(i, a, flight)
     for column, (ux, uy, uz) in zip(plan.observed["free"], plan.ray_directions, strict=True):
         flock.seen[column][i] = free_way(i, ux, uy, uz, flight)
     if plan.observe[0]:

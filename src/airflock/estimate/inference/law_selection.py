@@ -108,7 +108,7 @@ def identifiable_indices(model: FitModel, places: Sequence[Array] | Array, spans
     return kept
 
 
-def _acts(model: FitModel, places: Sequence[Array], index: int, spans: Sequence[int]) -> bool:
+def _acts(model: FitModel, places: Sequence[Array] | Array, index: int, spans: Sequence[int]) -> bool:
     """Return True if a number changes the loss anywhere along its range."""
     for u in places:
         here = model.score(u, spans).loss()
