@@ -152,6 +152,9 @@ def test_faulty_requests_are_refused_in_a_line():
         "budget = 0 s is no time above 0 s": lambda: airflock.attack(scenario, ["wind"], budget=0.0),
         "event = 'par': did you mean pair?": lambda: airflock.attack(scenario, ["wind"], event="par"),
         "breaks without any disturbance: 24 of 24 flights": lambda: airflock.attack(scenario, ["wind"], limit=90.0),
+        "has neither walls nor obstacles nor a scene to touch": lambda: airflock.attack(
+            airflock.load("vicsek_1995/ordered", {"agents": 4, "duration": 5.0}), ["wind"], event="world"
+        ),
         "one agent meets nobody": lambda: airflock.attack(small(agents=1), ["wind"]),
         "radio_silent: vasarhelyi_2018/4ms cannot suffer it": lambda: airflock.attack(
             small(update="sequential", **{"radio.delay": 0.0, "sensors.period": 0.0}), ["radio_silent"]

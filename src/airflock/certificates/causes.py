@@ -387,6 +387,18 @@ def event_count(flight: Flight, score: str) -> float:
     return float(sum(window.scores[score] for window in flight.windows) + flight.scores()[score])
 
 
+@dataclass(frozen=True)
+class _Request:
+    """How a flight is to be explained, as `why` takes it."""
+
+    leads: Sequence[float]
+    futures: int
+    interventions: Sequence[str] | None
+    budget: float | None
+    threads: int | None
+    notify: Callable[[str], None]
+
+
 def why(
     scenario: Scenario | Certificate | str | PathLike[str] | xr.Dataset,
     seed: int | None = None,
@@ -482,18 +494,6 @@ def why(
     return _explained(*chosen, how)
 
 
-@dataclass(frozen=True)
-class _Request:
-    """How a flight is to be explained, as `why` takes it."""
-
-    leads: Sequence[float]
-    futures: int
-    interventions: Sequence[str] | None
-    budget: float | None
-    threads: int | None
-    notify: Callable[[str], None]
-
-
 def _explained(flown: _FlownFlight, event: str, how: _Request) -> WhyResult:
     """Explain the first event of one flight."""
     step, time_of_event, agents, sentence = _first_event(flown, event)
@@ -503,8 +503,8 @@ def _explained(flown: _FlownFlight, event: str, how: _Request) -> WhyResult:
     notes = [f"each future begins with pushes of {PUSH:g} m/s (SD per axis), so that no two are the same"]
     if max(how.leads) > (step - 1) * dt:
         notes.append(f"the event comes {time_of_event:g} s after the start: no future branches off earlier")
-    ensembles = _Ensembles(flown, step, EVENTS[event], how.futures, how.threads, how.budget, how.notify, notes)
-    rows = ensembles.fly(list(steps), how.interventions)
+    ensembles = _Ensembles(flown, step, EVENTS[event], how, notes)
+    rows = ensembles.fly(list(steps))
     in_force = ensembles.bases[min(steps)].scenario  # with faults that were begun by hand
     return WhyResult(in_force, flown.seed, sentence, time_of_event, agents, rows, tuple(dict.fromkeys(notes)))
 
@@ -683,18 +683,16 @@ class _Ensembles:
     flown: _FlownFlight
     step: int
     score: str
-    futures: int
-    threads: int | None
-    budget: float | None
-    notify: Callable[[str], None]
+    how: _Request
     notes: list[str]
     outcomes: dict[tuple[int, str], NDArray[np.bool_]] = field(default_factory=dict)
     bases: dict[int, Flight] = field(default_factory=dict)
     known: dict[int, dict[str, Settings]] = field(default_factory=dict)
     ends: float = np.inf
 
-    def fly(self, leads: Sequence[int], chosen: Sequence[str] | None) -> tuple[CauseRow, ...]:
+    def fly(self, leads: Sequence[int]) -> tuple[CauseRow, ...]:
         """Fly all futures and judge them. Raises ScenarioError for an intervention that no lead has."""
+        chosen = self.how.interventions
         self.bases = {lead: self.flown.open(self.step - lead, fresh=True) for lead in leads}
         own = {} if chosen is None or isinstance(chosen, str) else own_interventions(chosen)
         self.known = {lead: declared_interventions(base.scenario) | own for lead, base in self.bases.items()}
@@ -706,21 +704,21 @@ class _Ensembles:
             raise ScenarioError([f"interventions: {name}: unknown; {known_line}" for name in unknown])
         for settings in own.values():
             with_settings(self.flown.scenario, settings)  # a wrong key is an error, and no note
-        self.ends = np.inf if self.budget is None else time.monotonic() + self.budget
+        self.ends = np.inf if self.how.budget is None else time.monotonic() + self.how.budget
         for lead in leads:
             taken = {name: each for name, each in self.known[lead].items() if chosen is None or name in chosen}
             self._fly(lead, NOTHING, {})
             for name, settings in taken.items():
                 self._fly(lead, name, settings)
         if not self.outcomes:
-            raise FlightError(f"budget = {self.budget:g} s is too short for {self.futures} futures; give more")
+            raise FlightError(f"budget = {self.how.budget:g} s is too short for {self.how.futures} futures; give more")
         rows = self._judged()
         return (*rows, *self._together(rows))
 
     def _fly(self, lead: int, name: str, settings: Settings) -> None:
         """Fly the futures of one intervention, and keep which of them have the event."""
         if time.monotonic() > self.ends or (name != NOTHING and (lead, NOTHING) not in self.outcomes):
-            self.notes.append(f"budget = {self.budget:g} s was spent: some leads or interventions are left out")
+            self.notes.append(f"budget = {self.how.budget:g} s was spent: some leads or interventions are left out")
             return
         base, later = self.bases[lead], self._done_later(lead)
         if later & {key.partition(".")[0] for key in settings}:
@@ -732,15 +730,15 @@ class _Ensembles:
                 start.change(settings)
             start.compile()
             self.ends += time.monotonic() - began
-            jobs = [self._future(start, world, lead) for world in range(FIRST_WORLD, FIRST_WORLD + self.futures)]
-            self.outcomes[lead, name] = np.array(list(run_in_threads(jobs, self.threads)), bool)
+            jobs = [self._future(start, world, lead) for world in range(FIRST_WORLD, FIRST_WORLD + self.how.futures)]
+            self.outcomes[lead, name] = np.array(list(run_in_threads(jobs, self.how.threads)), bool)
         except (FlightError, ScenarioError) as error:
             if name == NOTHING:
                 raise
             self.notes.append(f"{name}: left out: {error}")
             return
         seconds, count = lead * self.flown.scenario.flight.dt, int(self.outcomes[lead, name].sum())
-        self.notify(f"{seconds:g} s before, without {name}: {count} of {self.futures}")
+        self.how.notify(f"{seconds:g} s before, without {name}: {count} of {self.how.futures}")
 
     def _done_later(self, lead: int) -> set[str]:
         """Sections that the flight itself changes after a branch; noted, as every future has these changes."""
@@ -783,9 +781,9 @@ class _Ensembles:
     def _row(self, lead: int, name: str, p_value: float) -> CauseRow:
         """Return the row of one set of futures."""
         events, sure = int(self.outcomes[lead, name].sum()), 0.5 * (1.0 + CONFIDENCE)
-        low = lower_bound(events, self.futures, sure)
-        high = upper_probability_bound(events, self.futures, sure)
-        return CauseRow(lead * self.flown.scenario.flight.dt, name, events, self.futures, low, high, p_value)
+        low = lower_bound(events, self.how.futures, sure)
+        high = upper_probability_bound(events, self.how.futures, sure)
+        return CauseRow(lead * self.flown.scenario.flight.dt, name, events, self.how.futures, low, high, p_value)
 
     def _together(self, rows: Sequence[CauseRow]) -> list[CauseRow]:
         """Take further causes of a lead away with the strongest one while events are left: a smallest set."""
@@ -797,7 +795,7 @@ class _Ensembles:
         known, entries = self.known[lead], named_fault_entries(self.bases[lead].scenario)
         settings = known[best.without]
         for name in [row.without for row in named if row.lead == best.lead][1:MOST_TOGETHER]:
-            if best.events <= FEW * self.futures:
+            if best.events <= FEW * self.how.futures:
                 break
             both, label = settings | known[name], f"{best.without}{TOGETHER}{name}"
             if "faults" in settings and "faults" in known[name]:  # each leaves the entries of the other as they were

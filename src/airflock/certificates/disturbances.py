@@ -403,6 +403,8 @@ class _Target:
             for moment in range(-1, MOMENTS):
                 steps = round(begin_of(self.scenario, moment) / self.scenario.flight.dt) - flight.step
                 self.bases[number, moment] = (flight.advance(steps=steps) if steps > 0 else flight).branch()
+            if self.event == "world" and math.isnan(flight.scores()["clearance"]):
+                raise FlightError(f"{self.scenario.name}: has neither walls nor obstacles nor a scene to touch")
 
     def events(self, settings: Settings, seeds: Sequence[int]) -> NDArray[np.bool_]:
         """Return which whole flights have the event, (flight,)."""
