@@ -199,7 +199,12 @@ def test_every_flight_of_a_certificate_with_an_event_is_explained_and_its_plante
     few = airflock.why(file)
     assert {flight.seed for flight in few.flights} <= {flight.seed for flight in found.flights}
     assert len(few.flights) == min(5, len(found.flights)) and "only the worst flights are known" in few.notes[0]
+    damaged, garbage = tmp_path / "damaged.toml", tmp_path / "garbage.toml"
+    damaged.write_text(file.read_text().replace("[[worst]]", "[[worse]]"))
+    garbage.write_text("agents = [")
     lines = {
+        "damaged.toml: is damaged: ": lambda: airflock.why(damaged),
+        "garbage.toml: ": lambda: airflock.why(garbage, 1),
         "seed 3 is no flight with an event; there are ": lambda: airflock.why(file, 3),
         "a certificate holds its scenario and events; leave out": lambda: airflock.why(file, limit=2.0),
         "nothing to explain: no flight has an event": lambda: airflock.why(

@@ -48,10 +48,13 @@ from airflock.scenarios import (
 )
 from airflock.support import (
     RECORDINGS,
+    AirflockError,
     ErrorCollector,
     FlightError,
     RecordingError,
     ScenarioError,
+    StudyError,
+    as_error,
     expand_path,
     format_cell,
     holm_correction,
@@ -514,7 +517,12 @@ def _certificate(given: Any) -> Certificate | Path | None:
     if isinstance(given, Certificate):
         return given
     path = expand_path(given) if isinstance(given, str | PathLike) and str(given).endswith(".toml") else None
-    return path if path is not None and path.is_file() and "seal" in read_toml(path) else None
+    if path is None or not path.is_file():
+        return None
+    try:
+        return path if "seal" in read_toml(path) else None
+    except AirflockError:  # loading it as a scenario says what is wrong
+        return None
 
 
 def _hits(source: Certificate | Path, trust: bool) -> tuple[str, list[tuple[_FlownFlight, str]], list[str]]:
@@ -536,8 +544,9 @@ def _hits(source: Certificate | Path, trust: bool) -> tuple[str, list[tuple[_Flo
         events = [(limit, own) for limit in campaign.limits for own, row in rows if limit.has_happened(row)]
     else:
         limits = {limit.event: limit for limit in campaign.limits}
-        worst = [(limits[entry["limit"]], entry) for entry in document["worst"]]
-        events = [(limit, int(e["seed"])) for limit, e in worst if limit.has_happened({limit.score: e["value"]})]
+        with as_error(f"{source}: is damaged", StudyError):
+            worst = [(limits[entry["limit"]], entry) for entry in document["worst"]]
+            events = [(limit, int(e["seed"])) for limit, e in worst if limit.has_happened({limit.score: e["value"]})]
     hits: dict[tuple[int, str], _FlownFlight] = {}
     for limit, own in events:
         if (event := EVENT_OF_SCORE.get(limit.score)) is None:
