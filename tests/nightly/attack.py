@@ -3,11 +3,10 @@
     python tests/nightly/attack.py FOLDER [NUMBER ...] [--random 4000]
 
 Each flaw is one sentence in the rules of Vásárhelyi et al. 2018: a wall rule that is blind in an angle, neighbours that
-are ignored when near. Flights that are not disturbed never show it, and disturbances at random, up to the same largest
-dose, show most of them in fewer than one flight of 500. Must hold: the attack finds at least 9 of 10, each within 5
-minutes, with at most a fifth of the flights of a search at random (median); 10 of 10 with a twentieth is the aim.
-Flights are counted in durations: a branch that flies half of one counts half. Goes on where it stopped; one JSON file
-per flaw in FOLDER.
+are ignored when near. Flights that are not disturbed show it in at most 1 of 200, and disturbances at random, up to the
+same largest dose, in none to 19 of 1,000. Must hold: the attack finds at least 9 of 10, each within 5 minutes, with at
+most a fifth of the flights of a search at random (median); 10 of 10 with a twentieth is the aim. Flights are counted in
+durations: a branch that flies half of one counts half. Goes on where it stopped; one JSON file per flaw in FOLDER.
 """
 
 import argparse
