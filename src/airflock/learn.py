@@ -39,8 +39,8 @@ try:
 except ImportError as error:
     raise AirflockError("environments need gymnasium and pettingzoo: pip install 'airflock[learn]'") from error
 
-SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {  # of the registered ids: a preset, and what is changed in it
-    "Flock": ("vasarhelyi_2018/4ms", {"agents": 20, "duration": 120.0, "world.side": 120.0}),
+SCENARIOS: dict[str, tuple[str, dict[str, Any], str | None]] = {  # of the registered ids: preset, settings, law
+    "Flock": ("vasarhelyi_2018/4ms", {"agents": 20, "duration": 120.0, "world.side": 120.0}, None),
     "Corridor": (
         "vasarhelyi_2018/obstacles",
         {
@@ -48,9 +48,11 @@ SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {  # of the registered ids: a
             "world.arena": "polygon", "world.walls": "every_edge", "world.obstacles": [],
             "world.corners": [[-150.0, -20.0], [150.0, -20.0], [150.0, 20.0], [-150.0, 20.0]],
             "goals.kind": "points", "goals.points": [[130.0, 0.0, 0.0], [-130.0, 0.0, 0.0]], "metrics.kind": "kidger",
+            "metrics.r_coll": 1.0,
         },
+        "formation",  # the law of the preset knows no goals
     ),
-    "City": ("vasarhelyi_2018/city", {"agents": 10, "duration": 120.0}),
+    "City": ("vasarhelyi_2018/city", {"agents": 10, "duration": 120.0}, None),
 }  # fmt: skip
 LARGEST = {  # numbers of a law, then of its body, that bound its command; the largest of the first that have one
     "velocity": (("v_max", "v_flock", "speed"), ("speed_max",)),
@@ -82,10 +84,11 @@ class Episodes:
     """
 
     def __init__(
-        self, scenario: Any, count: int, settings: Mapping[str, Any] | None = None, *, neighbours: int | None = None,
-        rays: int | None = None, largest: float | None = None, threads: int | None = None, device: str = "cpu",
+        self, scenario: Any, count: int, settings: Mapping[str, Any] | None = None, *, law: Any = None,
+        neighbours: int | None = None, rays: int | None = None, largest: float | None = None,
+        threads: int | None = None, device: str = "cpu",
     ):  # fmt: skip
-        self.scenario = scenario_variant(scenario, settings)
+        self.scenario = scenario_variant(scenario, settings, law)
         if not self.scenario.metrics.rule.best:
             kind = self.scenario.metrics.kind
             raise FlightError(f"{self.scenario.name}: metrics.kind = {kind!r} has no fitness; it rewards nothing")
@@ -159,7 +162,7 @@ class FlockEnv(gymnasium.Env[Any, Any]):
     """One flight, all agents at once: observations (agent, column), actions (agent, axis), one reward.
 
     scenario, settings : a Scenario, a preset or a file, and what is changed in it
-    options            : neighbours, rays, largest: as of `parallel_env`
+    options            : law, neighbours, rays, largest: as of `parallel_env`
 
     `reset(seed=s)` begins the flight that `airflock.open(scenario, seed=s)` opens. Raises ScenarioError and
     FlightError.
@@ -289,9 +292,9 @@ def parallel_env(scenario: Any, *, agents: int | None = None, seed: int | None =
 
     scenario : a Scenario, a preset or a file; agents: how many, instead of what it says
     seed     : of the first episode; each one without a seed of its own takes the next
-    options  : settings, what is changed in the scenario; neighbours, of how many of the nearest that it hears each
-               agent observes offset, relative velocity, age and 1 (7); rays, ways around it (8 where anything stands);
-               largest, bound of a component of an action (what law and body say)
+    options  : settings and law, as in `load`; neighbours, of how many of the nearest that it hears each agent observes
+               offset, relative velocity, age and 1 (7); rays, ways around it (8 where anything stands); largest, bound
+               of a component of an action (what law and body say)
 
     Raises ScenarioError and FlightError.
     """
@@ -301,8 +304,8 @@ def parallel_env(scenario: Any, *, agents: int | None = None, seed: int | None =
 
 make_vec = VectorFlock
 
-for _name, (_preset, _settings) in SCENARIOS.items():
+for _name, (_preset, _settings, _law) in SCENARIOS.items():
     gymnasium.register(
         f"airflock/{_name}-v0", entry_point="airflock.learn:FlockEnv", vector_entry_point="airflock.learn:VectorFlock",
-        kwargs={"scenario": _preset, "settings": _settings},
+        kwargs={"scenario": _preset, "settings": _settings, "law": _law},
     )  # fmt: skip

@@ -94,6 +94,17 @@ def test_rays_end_at_the_walls(seed):
     assert free == pytest.approx(np.maximum(inside, 0.0).T, abs=1e-6)
 
 
+def test_offsets_lead_to_the_goal_and_rays_to_the_walls_of_a_corridor(seed):
+    preset, settings, law = learn.SCENARIOS["Corridor"]
+    scenario = airflock.load(preset, {**settings, "agents": 4, "start.separation": 3.0}, law=law)
+    flight = airflock.open(scenario, seed=seed, device="python", neighbours=3, rays=4)
+    seen, (x, y) = flight.perceived(), flight.measured[:2]
+    assert seen.goal == pytest.approx(np.stack([130.0 - x, -y], axis=1), abs=1e-6)
+    inside = np.abs(y) < 20.0
+    assert inside.any() and seen.free[inside][:, 1] == pytest.approx(20.0 - y[inside], abs=1e-6)
+    assert seen.free[inside][:, 0] == pytest.approx(np.minimum(150.0 - x[inside], 100.0), abs=1e-6)
+
+
 def test_a_stuck_drone_flies_on_whatever_a_policy_commands(seed):
     calm = {**FEW, "world.side": 60.0, "body.noise": 0.0, "faults": [{"kind": "stuck", "agents": [0], "at": 1.0}]}
     flights = airflock.open_many(airflock.load(LAW, calm), [seed], neighbours=2, device="python")
@@ -159,8 +170,8 @@ def test_interfaces_keep_the_rules_of_gymnasium_and_pettingzoo(seed):
 
 @pytest.mark.parametrize("name", learn.SCENARIOS)
 def test_each_registered_scenario_has_a_fitness_and_bounded_commands(name):
-    preset, settings = learn.SCENARIOS[name]
-    scenario = airflock.load(preset, settings)
+    preset, settings, law = learn.SCENARIOS[name]
+    scenario = airflock.load(preset, settings, law=law)
     assert scenario.metrics.rule.best == "fitness" and 0.0 < learn.largest_command(scenario) < 100.0
 
 
