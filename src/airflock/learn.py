@@ -54,9 +54,9 @@ SCENARIOS: dict[str, tuple[str, dict[str, Any], str | None]] = {  # of the regis
     ),
     "City": ("vasarhelyi_2018/city", {"agents": 10, "duration": 120.0}, None),
 }  # fmt: skip
-LARGEST = {  # numbers of a law, then of its body, that bound its command; the largest of the first that have one
-    "velocity": (("v_max", "v_flock", "speed"), ("speed_max",)),
-    "acceleration": (("a_max",), ("a_max",)),
+LARGEST = {  # numbers of the laws, else of the body, that bound a command: the largest of them
+    "velocity": ("v_max", "v_flock", "speed", "speed_max"),
+    "acceleration": ("a_max",),
 }
 MARGIN = 1.0 + 1e-5  # rounding: a law that cuts a vector to its largest length may exceed that by a bit
 
@@ -66,9 +66,9 @@ def largest_command(scenario: Scenario) -> float:
     kind = scenario.model.command
     if kind == "heading":
         return 1.0
-    owners = [law.parameters for law in scenario.laws], [scenario.body.numbers]
-    for names, records in zip(LARGEST[kind], owners, strict=True):
-        found = [float(value) for name in names for record in records if (value := getattr(record, name, None))]
+    laws = [law.parameters for law in scenario.laws] + [scenario.resolved_steer()] * scenario.steers
+    for records in (laws, [scenario.body.numbers]):
+        found = [float(value) for name in LARGEST[kind] for each in records if (value := getattr(each, name, None))]
         if found:
             return max(found)
     raise FlightError(
@@ -97,6 +97,8 @@ class Episodes:
             self.scenario, range(count), neighbours=most, rays=rays, threads=threads, device=device
         )
         bound = float(np.float32(largest_command(self.scenario) if largest is None else largest))
+        if not 0.0 < bound < np.inf:
+            raise FlightError(f"largest = {largest!r}: give a positive number, the bound of a component of an action")
         agents, dims = self.scenario.agents, self.scenario.dimensions
         self.action_space = Box(-bound, bound, (dims,), np.float32)
         self.observation_space = Box(-np.inf, np.inf, self.flights.percepts.table.shape[2:], np.float32)
@@ -209,10 +211,11 @@ class VectorFlock(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin all flights: with one seed s those of the seeds s, s + 1, ...; or with one for each."""
-        super().reset(seed=seed if seed is None or isinstance(seed, int) else seed[0])
-        seeds = self._drawn(self.num_envs) if seed is None else seed
-        if isinstance(seeds, int):
-            seeds = range(seeds, seeds + self.num_envs)
+        seeds = seed if isinstance(seed, Sequence) else None if seed is None else range(seed, seed + self.num_envs)
+        super().reset(seed=seeds[0] if seeds else None)
+        seeds = self._drawn(self.num_envs) if seeds is None else seeds
+        if len(seeds) != self.num_envs:
+            raise FlightError(f"reset: {len(seeds)} seeds for {self.num_envs} flights; give one, or one each")
         self.episodes.reset(dict(zip(range(self.num_envs), seeds, strict=True)))
         return self.episodes.observations, self.episodes.info
 
@@ -274,10 +277,10 @@ class ParallelFlock(pettingzoo.ParallelEnv[str, Any, Any]):  # type: ignore[misc
         """Fly to the next decision. Raises FlightError where an action is missing, or does not fit its space."""
         wanted = self.episodes.flights.commands[0].copy()  # whoever is absent commands nothing
         for agent in {**dict.fromkeys(self.agents), **actions}:
-            if agent not in self.agents or agent not in actions or np.shape(actions[agent]) != wanted.shape[1:]:
-                shape = f"an action of shape {np.shape(actions[agent])}" if agent in actions else "no action"
-                raise FlightError(f"{agent}: {shape}; each of env.agents acts, in {self.episodes.action_space}")
-            wanted[int(agent.rpartition("_")[2])] = actions[agent]
+            action = np.asarray(actions.get(agent))
+            if agent not in self.agents or action.shape != wanted.shape[1:] or action.dtype.kind not in "fiu":
+                raise FlightError(f"{agent}: {action}; each of env.agents acts, in {self.episodes.action_space}")
+            wanted[int(agent.rpartition("_")[2])] = action
         rewards, ended, cut = self.episodes.step(wanted[None])
         acted, there = self.agents, set(self._present())
         observations, infos = self._by_agent(acted)

@@ -221,10 +221,16 @@ def test_what_cannot_be_observed_or_rewarded_is_refused():
     with pytest.raises(FlightError, match="reset"):
         env.step({})
     env.reset()
-    with pytest.raises(FlightError, match="agent_3: no action; each"):
+    with pytest.raises(FlightError, match="agent_3: None; each of env.agents acts, in Box"):
         env.step({agent: env.action_space(agent).sample() for agent in env.agents if agent != "agent_3"})
-    with pytest.raises(FlightError, match="agent_12: an action of shape"):
+    with pytest.raises(FlightError, match="agent_12: .* each of env.agents"):
         env.step({f"agent_{i}": np.zeros(2) for i in range(13)})
+    with pytest.raises(FlightError, match="agent_0: .* each of env.agents"):
+        env.step({agent: ["a", "b"] for agent in env.agents})
+    with pytest.raises(FlightError, match="2 seeds for 1 flights"):
+        learn.make_vec(LAW, settings=BASE).reset(seed=[1, 2])
+    with pytest.raises(FlightError, match="largest = -1.0: give a positive number"):
+        learn.parallel_env(LAW, settings=BASE, largest=-1.0)
     with pytest.raises(FlightError, match="neighbours = 12: give 0 to 11; of 12 agents"):
         learn.parallel_env(LAW, settings=BASE, neighbours=12)
     with pytest.raises(FlightError, match="metrics.kind = 'order' has no fitness"):
