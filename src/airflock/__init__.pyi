@@ -28,6 +28,7 @@ from .engine import Flight as Flight, open_many as open_many, print_law as print
 from .estimate.identification.vehicle_identification import identify as identify
 from .estimate.inference.law_inference import infer as infer
 from .fleets.flying import fleet as fleet
+from .parts.laws.network import network_weights as network_weights
 from .parts.metrics.metric_sets import metric_set as metric_set
 from .recordings import measures as measures
 from .recordings.exports import export as export

@@ -18,6 +18,7 @@ from airflock.core import (
     Quantity,
     argument_names,
     choices,
+    column_places,
     component_names,
     declarations,
     law,
@@ -320,7 +321,7 @@ for _name in ("neg", "abs", "pos"):
 MATHS = SimpleNamespace(
     **{
         name: (lambda function: lambda *numbers: SinglePrecision(function(*numbers)))(getattr(math, name))
-        for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "pow", "fabs", "fmod")
+        for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "pow", "fabs", "fmod", "tanh")
     },
     floor=math.floor,
     ceil=math.ceil,
@@ -362,5 +363,7 @@ def to_single_precision(value: Any) -> Any:
         whole = {
             key: tuple(numbers[part] for part in component_names(key, n)) for key, n in type(value).VECTORS.items()
         }
+        columns = {place.partition("[")[0] for place in column_places(value)}
+        whole |= {name: tuple(map(SinglePrecision, getattr(value, name))) for name in columns}
         return SimpleNamespace(**choices(value), **numbers, **whole)
     return value

@@ -73,6 +73,8 @@ from .parameters import (
     Text as Text,
     choice as choice,
     choices as choices,
+    column as column,
+    column_places as column_places,
     component_names as component_names,
     declarations as declarations,
     expand_vectors as expand_vectors,

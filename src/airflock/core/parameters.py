@@ -160,13 +160,13 @@ class Choice(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Declaration of a list of points or of polygons; `depth` brackets deep (2: points, 3: polygons)."""
+    """Declaration of a list, `depth` brackets deep (2: points, 3: polygons), or of a column (1: numbers)."""
 
     unit: str
     depth: int
     meaning: str
     source: str
-    axes: int = 2  # coordinates of a point
+    axes: int = 2  # coordinates of a point; of a column how many numbers it has at most
 
 
 class Text(NamedTuple):
@@ -301,6 +301,14 @@ def points(unit: str, depth: int, *, meaning: str, source: str = "", axes: int =
     return field(default=(), metadata={"airflock": Points(unit, depth, meaning, source, axes)})
 
 
+def column(default: tuple[float, ...], unit: str, *, most: int, meaning: str, source: str = "") -> Any:
+    """Declare a column of at most so many numbers, which rules of a law read one by one, `p.name[k]`.
+
+    It may have any length. Unlike a vector it is not written out in a driver, and its numbers have no names.
+    """
+    return field(default=default, metadata={"airflock": Points(unit, 1, meaning, source, most)})
+
+
 def text(default: str = "", *, meaning: str, source: str = "") -> Any:
     """Declare a text."""
     return field(default=default, metadata={"airflock": Text(meaning, source)})
@@ -406,8 +414,10 @@ def telling_digits(value: float, is_wrong: Callable[[float], bool]) -> str:
 def points_error(value: Any, declared: Points) -> str:
     """Return the error of a list of points or polygons, as the rest of a sentence; empty if valid."""
     with suppress(TypeError, ValueError, OverflowError, RecursionError):
-        if _are_points(_frozen(value), declared.depth, declared.axes):
+        if _are_points(_frozen(value), declared):
             return ""
+    if declared.depth == 1:
+        return f"is not a list of at most {declared.axes} finite numbers; it holds {declared.meaning}"
     if declared.axes > 3:
         rows = f"rows of {declared.axes} numbers in {declared.unit}"
         return f"is not a list of {rows}; it holds {declared.meaning}"
@@ -416,12 +426,13 @@ def points_error(value: Any, declared: Points) -> str:
     return f"is not a list of {what} in {declared.unit}"
 
 
-def _are_points(value: Any, depth: int, axes: int) -> bool:
+def _are_points(value: Any, declared: Points, level: int = 1) -> bool:
     if not isinstance(value, tuple):
         return False
-    if depth > 1:
-        return all(_are_points(entry, depth - 1, axes) for entry in value)
-    return len(value) == axes and all(isinstance(number, float) and isfinite(number) for number in value)
+    if level < declared.depth:
+        return all(_are_points(entry, declared, level + 1) for entry in value)
+    fits = len(value) <= declared.axes if declared.depth == 1 else len(value) == declared.axes
+    return fits and all(isinstance(number, float) and isfinite(number) for number in value)
 
 
 def _frozen(value: Any) -> Any:
@@ -439,6 +450,12 @@ def number_names(record: Any) -> tuple[str, ...]:
 @cache
 def _number_names(kind: type) -> tuple[str, ...]:
     return tuple(name for name, declared, _ in declarations(kind) if isinstance(declared, Quantity))
+
+
+def column_places(record: Any) -> tuple[str, ...]:
+    """Return "name[k]" of each number of the columns of a record: its places in the row of a driver."""
+    columns = (name for name, declared, _ in declarations(record) if isinstance(declared, Points) and declared.depth == 1)
+    return tuple(f"{name}[{k}]" for name in columns for k in range(len(getattr(record, name))))
 
 
 def choices(record: Any) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate
@@ -575,6 +575,11 @@ def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tup
         "wing" in argument_names(metric.survey, "survey") for metric in found if metric.survey
     )
     return _chosen(scenario.wing) if used else ()
+
+
+def field_names(columns: Iterable[str]) -> tuple[str, ...]:
+    """Return the fields of a record whose numbers have these places in the row: a column is one field."""
+    return tuple(dict.fromkeys(name.partition("[")[0] for name in columns))
 
 
 @lru_cache

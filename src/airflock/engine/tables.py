@@ -131,8 +131,7 @@ def _common(scenario: Scenario, plan: Plan) -> WorldTables:
     scene = scenario.stands() if plan.scene else EMPTY
     shapes, later = without_appearing(scene)
     values = driver_records(scenario, dt * times["decide_every"])
-    # an optional number that is None becomes 0
-    numbers = [getattr(values[letter], name) or 0.0 for letter, names in plan.numbers for name in names]
+    numbers = [_number(values[letter], name) for letter, names in plan.numbers for name in names]
     counts = families + [0] * (2 - len(families))
     whole = times | {
         "agents": scenario.agents,
@@ -158,6 +157,13 @@ def _common(scenario: Scenario, plan: Plan) -> WorldTables:
         goals=scenario.waypoints().astype(real),
         own=np.zeros((0, scenario.agents), real),
     )
+
+
+def _number(record: Any, name: str) -> float:
+    """Return a number of a record, or of a column of it by "name[k]"; an optional one that is None becomes 0."""
+    name, _, place = name.partition("[")
+    value = getattr(record, name)
+    return float(value[int(place[:-1])] if place else value or 0.0)
 
 
 def agent_values(scenario: Scenario, plan: Plan, seed: int) -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 
 from airflock.core import Fault, Kind, PacketParameters, fault, number_names, without_replaced
 from airflock.parts import default_body
+from airflock.parts.laws import network_weights
 from airflock.scenarios import formats, schema
 from airflock.scenarios.named_code import find_law, law_from_caller
 from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, kept_keys, part_from_caller
@@ -25,6 +26,8 @@ from airflock.support import (
     as_error,
     expand_path,
     is_file,
+    parse_json,
+    read_text,
     read_toml,
     suggest,
 )
@@ -97,7 +100,8 @@ def load(
         stands in the scenario's `notes`.
     law : optional
         A flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead of the
-        file's, or one by its name or its file. Its parameters start from their defaults.
+        file's, or one by its name or its file. Its parameters start from their defaults; by the name of a preset they
+        are those of that preset.
     metrics : optional
         Order parameters of your own measure the flight: a `MetricSet`, a metric, a list of metrics and of names of
         ours, or a namespace such as globals(); likewise the name of a set or a file.
@@ -149,19 +153,61 @@ def load(
         document, caller_parts = _with_given(
             document, zip(PART_KINDS, (metrics, body, sensor, radio, topology), strict=True)
         )
+        errors = ErrorCollector()
+        errors.notes += [f"extends {base}: what is not given here is taken from there"] if base else []
+        taken: dict[str, Any] = {}
+        if isinstance(law, str) and law in presets():
+            preset, place = _read(law, None)
+            preset, _ = extend_document(preset, law, place, _read)
+            errors.notes.append(f"law = {law}: [model] and [steer] are those of that preset, and nothing else is")
+            taken, law = {key: preset[key] for key in ("model", "steer") if key in preset}, preset["model"]["kind"]
         own_law = None if law is None else law_from_caller(law)
         of_groups = {own.name: own for own in map(law_from_caller, _several(laws))}
         caller_parts = replace(caller_parts, law=own_law, fault_kinds=_kinds(faults), laws=of_groups)
-        errors = ErrorCollector()
-        errors.notes += [f"extends {base}: what is not given here is taken from there"] if base else []
         document, settings = with_field(document, settings_dict(settings, where), folder, errors)
         if own_law is not None:
             document = _with_robot_of(document, where, settings, folder, caller_parts, trust)
             kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else own_law.name
-            document = {**document, "model": {"kind": kind}, "published": {}}
+            document = {**document, "model": {"kind": kind}, "published": {}, **taken}
+        document, settings = _with_columns(document, settings, folder, errors)
         return build_scenario(
             document, where, settings, folder=folder, caller_parts=caller_parts, errors=errors, trust=trust
         )
+
+
+def _with_columns(
+    document: dict[str, Any], settings: Mapping[str, Any], folder: Path | None, errors: ErrorCollector
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Replace JSON files that keys of [model] name by the numbers that they hold, so that no recording names a file.
+
+    Layers, [[weights, bias], ...], become the column of the law `network`.
+    """
+
+    def read(table: Mapping[str, Any], beside: Path | None) -> dict[str, Any]:
+        found = dict(table)
+        for key, name in table.items():
+            if key.startswith("model.") and isinstance(name, str) and name.endswith(".json"):
+                del found[key]
+                path = expand_path(name) if is_file(name) or beside is None else beside / expand_path(name)
+                with errors.collecting(f"{key} = {name!r}: "):
+                    found[key] = column_of_file(path)
+        return found
+
+    model = document.get("model")
+    if isinstance(model, Mapping):
+        whole = read({f"model.{key}": value for key, value in model.items()}, folder)
+        document = {**document, "model": {key[6:]: value for key, value in whole.items()}}
+    return document, read(settings, None)
+
+
+def column_of_file(path: Path) -> list[float]:
+    """Read a JSON file of numbers, or of layers for the law `network`. Raises ScenarioError, ParameterError."""
+    if not is_file(path):
+        raise ScenarioError(["no such file"])
+    found = parse_json(read_text(path))
+    if not isinstance(found, list) or not found:
+        raise ScenarioError(["holds neither a list of numbers nor of layers, [[weights, bias], ...]"])
+    return network_weights(found) if isinstance(found[0], list) else found
 
 
 def _with_robot_of(
@@ -346,6 +392,8 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     for section in ("model", "body", "sensors", "radio", "topology", "metrics", "scene"):
         if section in result:
             result[section] = _with_path(result[section], folder, "file" if section == "scene" else "kind")
+    if "model" in result:
+        result["model"] = _with_path(result["model"], folder, "weights")
     if isinstance(faults := result.get("faults"), list):
         result["faults"] = [_with_path(entry, folder) for entry in faults]
     if isinstance(groups := result.get("groups"), list):

@@ -339,7 +339,8 @@ def _value(key: Key, declared: Declaration) -> dict[str, Any]:
     if isinstance(declared, Choice):
         plain = {"enum": [*key.options, *(int(option) for option in key.options if option.isdecimal())]}
     elif isinstance(declared, Points):
-        plain = {"type": "array", "items": {"type": "number"}, "minItems": declared.axes, "maxItems": declared.axes}
+        plain = {"type": "array", "items": {"type": "number"}, "maxItems": declared.axes}
+        plain |= {"minItems": declared.axes} if declared.depth > 1 else {}
         for _ in range(declared.depth - 1):
             plain = {"type": "array", "items": plain}
         unit = {"enum": sorted({"", key.unit, *unit_names(key.unit)})}

@@ -22,6 +22,7 @@ from airflock.core import (
     Topology,
     declarations,
     format_with_unit,
+    column_places,
     number_names,
     random,
     with_defaults,
@@ -194,7 +195,9 @@ class Scenario:
         columns["b"] = tuple(name for name in columns["b"] if name not in number_names(BodyParameters))
         if not self.steers:
             del columns["steer"]
-        return columns | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
+        columns["p"] += column_places(self.parameters)
+        more = {f"p{k}": law.parameters for k, law in enumerate(self.laws) if k}
+        return columns | {letter: number_names(p) + column_places(p) for letter, p in more.items()}
 
     @cached_property
     def order_parameters(self) -> tuple[Metric, ...]:

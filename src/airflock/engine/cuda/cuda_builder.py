@@ -20,7 +20,7 @@ from airflock.engine.cuda.lowering import (
     with_reciprocals,
 )
 from airflock.engine.passes.build import JIT_DECORATOR, Builder, branch_lines, inline_lines, loop_lines
-from airflock.engine.plan import Plan
+from airflock.engine.plan import Plan, field_names
 from airflock.engine.primitives import DECLARED, NARROW
 from airflock.engine.replace import checked_replace
 from airflock.engine.specialise.known_values import LocalVector, driver_argument
@@ -482,7 +482,7 @@ class CudaBuilder(Builder):
         """Name of the record of numbers behind a letter; a kernel reads those of all laws."""
         law = letter.removeprefix("p")
         if letter != "p" and law.isdigit():
-            return self.source.record(f"PP{law_suffix(int(law))}", fields)
+            return self.source.record(f"PP{law_suffix(int(law))}", field_names(fields))
         return super().kind(letter, fields)
 
     def named(self, letter: str) -> str:

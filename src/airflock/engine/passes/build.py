@@ -3,11 +3,12 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
+from itertools import groupby
 from textwrap import indent
 from typing import Any
 
 from airflock.core import Metric, argument_names
-from airflock.engine.plan import INTEGER_NAMES, Plan
+from airflock.engine.plan import INTEGER_NAMES, Plan, field_names
 from airflock.engine.replace import ReplacementError, checked_replace
 from airflock.engine.specialise.known_values import StageFunction
 from airflock.engine.stages.state import FAULT_PREFIX, NUMBER_PREFIX, SCENE_ARRAYS
@@ -103,7 +104,7 @@ class Builder:
 
     def kind(self, letter: str, fields: tuple[str, ...]) -> str:
         """Name of the record of numbers behind a letter."""
-        return self.source.record(letter.upper() * 2 + (self.mark if letter == "p" else ""), fields)
+        return self.source.record(letter.upper() * 2 + (self.mark if letter == "p" else ""), field_names(fields))
 
     @property
     def is_sequential(self) -> bool:
@@ -127,7 +128,7 @@ class Builder:
         """Lines that read records of numbers under names that begin with a prefix."""
         spans, wanted = self.plan.spans, set(letters)
         return [
-            f"{prefix}{letter} = {self.kind(letter, fields)}({', '.join(f'row[{c}]' for c in _places(spans[letter]))})"
+            f"{prefix}{letter} = {self.kind(letter, fields)}({', '.join(_values(fields, spans[letter].start))})"
             for letter, fields in self.plan.records.items()
             if letter in wanted
         ]
@@ -201,8 +202,13 @@ class Builder:
         return list(lines)
 
 
-def _places(span: slice) -> range:
-    return range(span.start, span.stop)
+def _values(fields: tuple[str, ...], first: int) -> list[str]:
+    """Values of the fields of a record in the row from a place on: a number each, of a column all of its numbers."""
+    found = []
+    for (_, mark), part in groupby(enumerate(fields, first), lambda each: each[1].partition("[")[:2]):
+        places = [place for place, _ in part]
+        found.append(f"row[{places[0]}:{places[-1] + 1}]" if mark else f"row[{places[0]}]")
+    return found
 
 
 def _marked(lines: list[str], names: list[str], mark: str) -> list[str]:

@@ -3,4 +3,5 @@ from . import (
     kidger as kidger,
     vasarhelyi_2018 as vasarhelyi_2018,
 )
+from .network import network_weights as network_weights
 from .vasarhelyi_2018 import Parameters as Parameters

@@ -1,0 +1,2 @@
+from .law import *
+from .law import __doc__ as __doc__
