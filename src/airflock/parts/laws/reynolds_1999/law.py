@@ -38,19 +38,19 @@ OURS = "our choice, for drones; the paper prints no numbers"
 class Parameters(Record):
     """Radii and weights of the three behaviours, and limits of the vehicle."""
 
-    r_s: float = quantity(15.0, "m", low=0.0, high=1e4, source=OURS, meaning="radius of separation")
-    r_c: float = quantity(50.0, "m", low=0.0, high=1e4, source=OURS, meaning="radius of cohesion")
-    r_a: float = quantity(40.0, "m", low=0.0, high=1e4, source=OURS, meaning="radius of alignment")
+    r_s: float = quantity(24.0, "m", low=0.0, high=1e4, source=OURS, meaning="radius of separation")
+    r_c: float = quantity(40.0, "m", low=0.0, high=1e4, source=OURS, meaning="radius of cohesion")
+    r_a: float = quantity(60.0, "m", low=0.0, high=1e4, source=OURS, meaning="radius of alignment")
     fov_deg: float = quantity(360.0, "deg", low=0.0, high=360.0, source=OURS, meaning="full field of view")
-    w_s: float = quantity(3.0, "m^2/s^2", low=0.0, high=1e4, source=OURS, meaning="weight of separation")
-    w_c: float = quantity(0.01, "1/s^2", low=0.0, high=1e4, source=OURS, meaning="weight of cohesion")
-    w_a: float = quantity(0.3, "1/s", low=0.0, high=1e4, source=OURS, meaning="weight of alignment")
+    w_s: float = quantity(13.0, "m^2/s^2", low=0.0, high=1e4, source=OURS, meaning="weight of separation")
+    w_c: float = quantity(0.005, "1/s^2", low=0.0, high=1e4, source=OURS, meaning="weight of cohesion")
+    w_a: float = quantity(0.9, "1/s", low=0.0, high=1e4, source=OURS, meaning="weight of alignment")
     w_seek: float = quantity(0.5, "1/s", low=0.0, high=1e4, source=OURS, meaning="weight of seeking, at v_max")
     v_max: float = quantity(4.0, "m/s", low=0.01, high=1e3, source=OURS, meaning="largest and preferred speed")
-    a_max: float = quantity(3.0, "m/s^2", low=0.0, high=1e4, source=OURS, meaning="largest force over mass")
-    turn: float = quantity(0.7, "rad/s", low=0.0, high=100.0, source=OURS, meaning="largest rate of turn")
-    look_ahead: float = quantity(4.0, "s", low=0.0, high=1e3, source=OURS, meaning="how far ahead walls are seen")
-    w_wall: float = quantity(0.5, "1/s^2", low=0.0, high=1e4, source=OURS, meaning="weight of containment")
+    a_max: float = quantity(4.5, "m/s^2", low=0.0, high=1e4, source=OURS, meaning="largest force over mass")
+    turn: float = quantity(0.6, "rad/s", low=0.0, high=100.0, source=OURS, meaning="largest rate of turn")
+    look_ahead: float = quantity(4.5, "s", low=0.0, high=1e3, source=OURS, meaning="how far ahead walls are seen")
+    w_wall: float = quantity(0.45, "1/s^2", low=0.0, high=1e4, source=OURS, meaning="weight of containment")
 
 
 class Sums(NamedTuple):
