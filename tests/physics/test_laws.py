@@ -10,7 +10,19 @@ from airflock.core.agent import HeardNeighbour, decide, sum_neighbours
 from airflock.core.contract import State
 from airflock.core.maths import bell, braking_curve, braking_distance, excess, peak, rising
 from airflock.core.model import model
-from airflock.parts.laws import vasarhelyi_2018, viragh_2014
+from airflock.core.vocabulary import Own, Percept
+from airflock.engine import fly_world
+from airflock.parts.laws import (
+    cucker_smale_2007,
+    network,
+    olfati_saber_2006,
+    potential_field,
+    reynolds_1999,
+    vasarhelyi_2018,
+    viragh_2014,
+)
+from airflock.scenarios import load
+from airflock.support import ParameterError
 
 MODELS = [model(vasarhelyi_2018), model(viragh_2014)]
 A, P = [1.0, 3.0, 8.0], [0.3, 1.0, 5.0]
@@ -189,6 +201,122 @@ def test_a_wall_turns_an_agent_round_and_a_far_one_does_nothing(law):
     )
     assert near[0] < 0.5 * p.v_flock
     assert far == pytest.approx((p.v_flock, 0.0, 0.0))
+
+
+def test_friction_of_2014_counts_distance_from_within_the_repulsion_range():
+    """Twice the difference is pulled twice as much; the slope is constant up to r0 - r2 + r_min, then 1 over square."""
+    law, p = MODELS[1], viragh_2014.Parameters(p_rep=0.0, r0_rep=20.0, r2_frict=8.0, r_min_frict=5.0, c_frict=30.0)
+    still = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for distance, slope in ((1.0, 1.2), (17.0, 1.2), (22.0, 0.3), (32.0, 0.075)):
+        for speed in (0.5, 1.0):
+            found = pair(law, p, still, State(distance, 0.0, 0.0, 0.0, speed, 0.0))
+            assert found == pytest.approx([0.0, slope * speed, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("beta", [0.1, 0.3, 0.5])
+def test_cucker_smale_velocities_meet_within_the_rates_of_the_theorem(beta, seed):
+    """However a flock starts; each step keeps a share of the deviation between those of the nearest and farthest."""
+    n, dt, k, sigma = 8, 0.05, 0.05, 10.0
+    rng = np.random.default_rng(seed)
+    start = np.vstack([rng.uniform(-30.0, 30.0, (2, n)), rng.normal(0.0, 5.0, (2, n))])
+    law = {"model.k": k, "model.sigma": sigma, "model.beta": beta}
+    scenario = load("cucker_smale_2007/flock", {"agents": n, "duration": 20.0, "dt": dt, "metrics.period": dt} | law)
+    frames = fly_world(scenario, 1, precision=64, record=True, start=start, device="python").frames
+    offsets = frames[:, :2, :, None] - frames[:, :2, None, :]
+    farthest = np.sqrt((offsets**2).sum(axis=1)).max()
+    deviation = np.sqrt(((frames[:, 2:4] - frames[:, 2:4].mean(axis=2, keepdims=True)) ** 2).sum(axis=(1, 2)))
+    steps = np.arange(len(frames))
+    slowest = n * k * (1.0 + (farthest / sigma) ** 2) ** -beta
+    assert (deviation <= deviation[0] * (1.0 - dt * slowest) ** steps * (1.0 + 1e-9)).all()
+    assert (deviation >= deviation[0] * (1.0 - dt * n * k) ** steps * (1.0 - 1e-9)).all()
+    assert deviation[-1] < 0.5 * deviation[0]
+    mean = frames[:, 2:4].mean(axis=2)
+    np.testing.assert_allclose(mean, np.broadcast_to(mean[0], mean.shape), atol=1e-9)  # which the law keeps
+
+
+def test_olfati_saber_agents_gather_to_a_lattice_and_stand():
+    """Deviation energy per edge over d², and velocity mismatch per agent over that of the start."""
+    scenario = load("olfati_saber_2006/lattice")
+    frames = fly_world(scenario, 1, record=True).frames
+    x, v = frames[-1, :2], frames[-1, 2:4]
+    away = np.hypot(*(x[:, :, None] - x[:, None, :]))
+    d, edges = scenario.parameters.d, (away > 0.0) & (away < scenario.parameters.r)
+    assert edges.sum() / scenario.agents > 4.0  # most agents have six
+    assert ((away[edges] - d) ** 2).sum() / (edges.sum() + 1) / d**2 < 1e-3
+    mismatch = [(each - each.mean(axis=1, keepdims=True)) ** 2 for each in (frames[0, 2:4], v)]
+    assert mismatch[1].sum() < 1e-2 * mismatch[0].sum()
+
+
+def test_olfati_saber_pairs_rest_at_the_distance_of_the_lattice():
+    p = olfati_saber_2006.Parameters(a=3.0, b=5.0)
+    along = [olfati_saber_2006.neighbour(r, 0.0, 0.0, r, 0.0, 0.0, 0.0, p).x for r in (5.0, p.d, 8.0, p.r, 20.0)]
+    assert along[0] < 0.0 < along[2] and along[1] == pytest.approx(0.0, abs=1e-9) and along[3:] == [0.0, 0.0]
+
+
+def test_reynolds_1999_never_turns_faster_than_its_limit(seed):
+    rng, p = np.random.default_rng(seed), reynolds_1999.Parameters(turn=0.4, a_max=50.0)
+    for _ in range(100):
+        v = rng.normal(0.0, 3.0, 3)
+        speed = np.linalg.norm(v)
+        sums = reynolds_1999.Sums(*rng.normal(0.0, 10.0, 9), 3.0, 3.0)
+        walls = reynolds_1999.Walls(*rng.normal(0.0, 10.0, 3))
+        a = reynolds_1999.decide(Own(*v, *(v / speed)), sums, walls, Percept(0.0, 0.0, 0.0, 0.0), p)
+        across = np.linalg.norm(np.cross(v / speed, a))
+        assert across <= p.turn * max(speed, 0.1 * p.v_max) * (1.0 + 1e-6)
+
+
+def test_forces_of_the_potential_field_are_the_slopes_of_its_potentials():
+    p, step = potential_field.Parameters(), 1e-4
+
+    def between(r):
+        return p.alpha * (math.log(r) + p.d_0 / r)
+
+    def surface(rho):
+        return 0.5 * p.eta * (1.0 / rho - 1.0 / p.rho_0) ** 2
+
+    for r in (5.0, p.d_0, 50.0):
+        slope = (between(r + step) - between(r - step)) / (2.0 * step)
+        assert potential_field.neighbour(r, 0.0, 0.0, r, p).x == pytest.approx(slope, abs=1e-6)
+    for rho in (3.0, 10.0, 29.0):
+        slope = (surface(rho + step) - surface(rho - step)) / (2.0 * step)
+        assert potential_field.boundary(rho, 1.0, 0.0, 0.0, p).x == pytest.approx(-slope, rel=1e-5)
+    assert potential_field.neighbour(70.0, 0.0, 0.0, 70.0, p).x == potential_field.boundary(31.0, 1.0, 0.0, 0.0, p).x == 0
+
+
+@pytest.mark.parametrize("widths", [(), (5,), (18, 2), (7, 18, 4)])
+def test_the_law_network_is_the_network_of_its_layers(widths, seed):
+    rng = np.random.default_rng(seed)
+    sizes = [network.INPUTS, *widths, network.OUTPUTS]
+    layers = [(rng.normal(0.0, 0.5, (out, into)), rng.normal(0.0, 0.2, out)) for into, out in zip(sizes, sizes[1:])]
+    p = network.Parameters(weights=tuple(network.network_weights(layers)), v_max=150.0)
+    a = rng.normal(0.0, 1.0, network.INPUTS)
+    expected = a
+    for number, (weights, bias) in enumerate(layers, 1):
+        expected = weights @ expected + bias
+        expected = np.tanh(expected) if number < len(layers) else expected
+    found = (*a, 1.0)
+    for number in range(len(widths)):
+        found = network.layer(network.BLOCK * number, found, p)
+    first = network.BLOCK * len(widths)
+    assert [network.unit_sum(first + network.ROW * k, found, p) for k in range(3)] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("layers", "words"),
+    [
+        ([([[0.0] * 17] * 3, [0.0] * 3)], "layer 1 of 1 has weights of shape 3 x 17 .*; expected 3 x 18"),
+        ([([[0.0] * 18] * 3, [0.0] * 2)], "and 2 biases; expected 3 x 18, and a bias a unit"),
+        ([([[0.0] * 18] * 8, [0.0] * 8), ([[0.0] * 9] * 3, [0.0] * 3)], "layer 2 of 2 .* 3 x 9 .* expected 3 x 8"),
+        ([([[0.0] * 18] * 19, [0.0] * 19), ([[0.0] * 19] * 3, [0.0] * 3)], "19 x 18 .* expected 1 to 18 x 18"),
+        ([([[0.0] * 18] * 18, [0.0] * 18)] * 6 + [([[0.0] * 18] * 3, [0.0] * 3)], "7 layers take 2109 numbers"),
+        ([([["x"] * 18] * 3, [0.0] * 3)], "layer 1 of 1 is no pair of rows of numbers and biases"),
+        ([], "give 1 to 6 layers"),
+    ],
+)
+def test_weights_of_a_wrong_shape_are_one_line_with_both_shapes(layers, words):
+    with pytest.raises(ParameterError, match=words) as caught:
+        network.network_weights(layers)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_an_agent_runs_without_arrays_or_compilers():

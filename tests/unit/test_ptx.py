@@ -25,6 +25,11 @@ KERNELS = {
     "dimock_2003/physical": {},
     "vasarhelyi_2018/fixed_wing": {},
     "chen_2014/hunt": {},
+    "olfati_saber_2006/lattice": {},
+    "cucker_smale_2007/flock": {},
+    "reynolds_1999/drones": {},
+    "potential_field/drones": {},
+    "network/drones": {},
 }
 
 

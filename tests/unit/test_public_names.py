@@ -34,7 +34,7 @@ LIBRARY_FUNCTIONS = {
     "open_many",
     "body", "fault", "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric",
     "check_sensor", "check_radio", "check_topology", "check_fault", "print_law", "quantity", "choice",
-    "why",
+    "network_weights", "why",
 }  # fmt: skip
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page
 

@@ -11,9 +11,12 @@ import airflock
 from against_reference import compared
 from airflock.core import Own
 from airflock.drones.onboard.card import CardError, card_hash, parse_card
+from airflock.engine import fly_world
 from airflock.fleets.card_document import make_card_document
 from airflock.parts import BODIES, SENSORS
 from airflock.parts.steering import NO_LIMIT, STEERING, Parameters, law_for_command
+from airflock.scenarios import build_scenario
+from airflock.scenarios.named_code import MODELS, find_law
 from airflock.support import RuleError, ScenarioError
 from scenarios_drawn import Draw
 
@@ -89,18 +92,76 @@ def test_a_group_of_another_law_and_command_is_that_of_the_pilots():
     assert compared(Draw(scenario, 3, None, {})).agrees
 
 
-@pytest.mark.parametrize(
-    "preset", ["couzin_2002/torus", "couzin_2005/informed", "vicsek_1995/ordered", "zapotecatl_2016/best"]
-)
-def test_laws_of_headings_and_accelerations_fly_multirotors(preset):
-    """The mean speed is above half of that of the same flight on the law's own body."""
-    few = {"agents": 10, "duration": 30.0}
+FLOWN = [name for name in MODELS if name not in ("formation", "network")]
+OWN_BODIES = {"chen_2014": "direct", "dimock_2003": "direct", "reynolds_1987": "steered"}  # of laws that come to rest
 
-    def speed(settings):
-        recording = airflock.simulate(airflock.load(preset, few | settings), seed=1)
-        return float(np.linalg.norm(recording["velocity"].values, axis=1).mean())
 
-    assert speed({"body.kind": "multirotor"}) > 0.5 * speed({})
+@pytest.mark.parametrize("name", FLOWN)
+def test_every_law_flies_multirotors_and_quadrotors_at_more_than_half_of_its_speed(name):
+    """A law without a preferred speed is compared with the same flight on a body without inertia."""
+    law = next((each for each in (f"{name}/drones", f"{name}/natural") if each in airflock.presets()), name)
+
+    def speed(body):
+        settings = {"agents": 3, "duration": 16.0, "dt": 0.04, "metrics.period": 2.0, "start.kind": "ball"}
+        settings |= {"start.radius": 25.0, "start.separation": 10.0, "start.speed": 2.0}
+        more = {"body.speed_max": 4.0} if body == "steered" else {}
+        scenario = airflock.load("vasarhelyi_2018/4ms", {**settings, "body.kind": body, **more}, law=law)
+        recording = airflock.simulate(scenario, seed=1, device="python")
+        assert np.isfinite(recording["position"].values).all()
+        speeds = np.linalg.norm(recording["velocity"].values[4:], axis=1)  # without the first 8 s
+        return float(speeds.mean()), scenario.resolved_metrics().v_flock
+
+    own = speed(OWN_BODIES[name])[0] if name in OWN_BODIES else None
+    for body in ("multirotor", "quadrotor"):
+        mean, preferred = speed(body)
+        assert mean > 0.5 * (preferred if own is None else own)
+
+
+QUIET = {"couzin_2002": {"sigma": 0.0}, "couzin_2005": {"sigma": 0.0}, "vicsek_1995": {"eta": 0.0, "r": 6.0}}
+CONVERTED = [name for name in FLOWN if find_law(name).command != "velocity"]
+
+
+def pursued(name, agents, dt, steered, seed):
+    """Where agents are after 10 s: on the body of the law, or converted on one that obeys at once."""
+    rng = np.random.default_rng(seed)
+    start = np.vstack([rng.uniform(-4.0, 4.0, (2, agents)), rng.normal(0.0, 2.0, (2, agents))])
+    heading = find_law(name).command == "heading"
+    keys = {f"model.{key}": value for key, value in QUIET.get(name, {}).items()}
+    keys |= {"agents": agents, "duration": 10.0, "dt": dt, "world.arena": "none", "world.walls": "every_edge"}
+    keys |= {"start.kind": "ball", "start.radius": 5.0, "start.separation": 0.0, "metrics.kind": "order"}
+    keys |= {"sensors.kind": "perfect", "sensors.period": 0.0, "radio.delay": 0.0, "metrics.period": 1.0}
+    limits = {"speed": 3.0, "turn": 0.7} if heading else {"speed": 1e3}
+    own = limits if heading else {"speed_max": 1e3}
+    keys |= {f"steer.{key}": value for key, value in limits.items()} if steered else {
+        f"body.{key}": value for key, value in own.items()
+    }  # fmt: skip
+    keys["body.kind"] = "direct" if steered else "heading" if heading else "steered"
+    scenario = build_scenario({"model": {"kind": name}}, "pursued", keys)
+    return fly_world(scenario, 1, precision=64, record=True, start=start, device="python").frames[-1][:2]
+
+
+@pytest.mark.parametrize("name", CONVERTED)
+def test_on_an_ideal_body_a_converted_law_has_the_bits_of_its_own_body(name, seed):
+    for agents in (2, 5):
+        assert (pursued(name, agents, 0.1, True, seed) == pursued(name, agents, 0.1, False, seed)).all()
+
+
+@pytest.mark.parametrize("agents", [2, 5])
+def test_the_error_of_a_converted_law_falls_at_least_as_fast_as_the_time_step(agents):
+    """Cucker and Smale's law, which is smooth: against a thirty-second of the longest step."""
+    exact = pursued("cucker_smale_2007", agents, 0.003125, False, 5)
+    errors = [np.abs(pursued("cucker_smale_2007", agents, dt, True, 5) - exact).max() for dt in (0.1, 0.05, 0.025)]
+    assert min(np.log2(np.divide(errors[:-1], errors[1:]))) >= 0.9
+
+
+def test_a_law_by_the_name_of_a_preset_brings_its_numbers_and_leaves_the_robot():
+    scenario = airflock.load("vasarhelyi_2018/8ms", {"agents": 9}, law="couzin_2002/drones")
+    taken = airflock.load("couzin_2002/drones")
+    assert scenario.parameters == taken.parameters and scenario.steer == taken.steer
+    assert scenario.world == airflock.load("vasarhelyi_2018/8ms").world and scenario.model.name == "couzin_2002"
+    assert any("couzin_2002/drones" in note for note in scenario.notes)
+    by_hand = airflock.load("vasarhelyi_2018/8ms", {"model.r_r": 9.0}, law="couzin_2002/drones")
+    assert by_hand.parameters.r_r == 9.0 and by_hand.parameters.dr_o == taken.parameters.dr_o
 
 
 def test_a_law_that_replaces_another_flies_its_body_at_its_speed():
@@ -175,7 +236,8 @@ def test_the_robot_stays_where_a_file_needs_the_callers_parts_and_settings(unsou
 
 
 def test_a_law_on_a_body_that_takes_its_command_is_not_steered():
-    assert all(airflock.load(name).model.steer is None for name in airflock.presets())
+    own = [name for name in airflock.presets() if not name.endswith("/drones")]  # those are there for other bodies
+    assert all(airflock.load(name).model.steer is None for name in own)
     assert set(STEERING) == {
         pair for pair in product(("velocity", "acceleration", "heading"), repeat=2) if len(set(pair)) == 2
     }

@@ -425,6 +425,10 @@ class Plan:
         """Columns of the parameter row, by record name, in order."""
         return dict(self.numbers)
 
+    def fields(self, letter: str) -> tuple[str, ...]:
+        """Fields of a record of numbers."""
+        return field_names(self.records[letter])
+
     @cached_property
     def spans(self) -> dict[str, slice]:
         """Where the numbers of each record stand in the parameter row."""

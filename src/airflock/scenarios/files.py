@@ -158,7 +158,7 @@ def load(
         taken: dict[str, Any] = {}
         if isinstance(law, str) and law in presets():
             preset, place = _read(law, None)
-            preset, _ = extend_document(preset, law, place, _read)
+            preset, _ = extend_document(preset, law, place)
             errors.notes.append(f"law = {law}: [model] and [steer] are those of that preset, and nothing else is")
             taken, law = {key: preset[key] for key in ("model", "steer") if key in preset}, preset["model"]["kind"]
         own_law = None if law is None else law_from_caller(law)
@@ -409,7 +409,7 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 def _with_path(table: Any, folder: Path, key: str = "kind") -> Any:
     """Return a table in which the file of code or the mesh of a key has its absolute path."""
     name = value_of(table.get(key)) if isinstance(table, Mapping) else None
-    if not isinstance(name, str) or not name or not (key == "file" or name.endswith(".py")):
+    if not isinstance(name, str) or not name or not (key == "file" or name.endswith((".py", ".json"))):
         return table
     is_beside = not expand_path(name).is_absolute() and is_file(folder / name)
     return {**table, key: str((folder / name).absolute())} if is_beside else table

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from airflock.engine.plan import Plan, field_names
+from airflock.engine.plan import Plan
 from airflock.engine.stages.records import CandidateRows
 from airflock.engine.stages.words import *
 
@@ -190,7 +190,7 @@ def agent_numbers(i: int, letter: str, flock: FlockRows, numbers: Any, *, plan: 
         numbers.own[letter](
             *[
                 flock.own(letter, name)[i] if (letter, name) in plan.varied else getattr(getattr(numbers, letter), name)
-                for name in field_names(plan.records[letter])
+                for name in plan.fields(letter)
             ]
         )
         if plan.varies(letter)

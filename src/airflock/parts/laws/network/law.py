@@ -84,8 +84,9 @@ def network_weights(layers: Sequence[tuple[Any, Any]]) -> list[float]:
     Returns
     -------
     list of float
-        For `airflock.load(preset, {"model.weights": ...}, law="network")`, or for a JSON file that `model.weights`
-        names.
+        Plain numbers, since an input or output is a multiple of the unit of its kind: `r`, `v_flock`. For
+        `airflock.load(preset, {"model.weights": ...}, law="network")`, or for a JSON file that `model.weights` names.
+        The order is ours.
 
     Raises
     ------
