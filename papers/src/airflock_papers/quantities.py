@@ -31,6 +31,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "top_speed": ("speed up", "speed"),
     # what keeps the fitness below 1 (vasarhelyi_2018/limits.py)
     "phi_vel in turns": ("speed",),
+    "transient": ("transient",),
     "phi_corr in turns": ("velocity correlation",),
     "fitness in a smaller arena": ("smaller arena",),
     # what was said of the real drones (vasarhelyi_2018/real.py)

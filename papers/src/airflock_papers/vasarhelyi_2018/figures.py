@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from airflock_papers.vasarhelyi_2018 import fig2, table_s2
 from airflock_papers.vasarhelyi_2018.published import SPEEDS, optimum, program_runs
@@ -77,7 +78,7 @@ def _moments(values: pd.Series) -> tuple[float, float]:
 
 
 def _fig1(data: Any) -> Figure:
-    """Timelines of one flight each, and A over the delay."""
+    """Timelines of one flight each, and A over r2 and the side, with the box of the caption."""
     figure, axes = _axes(1, 3, 12.0, 3.2)
     lines = ((data.a[0], PAPER, "A"), (data.early[0], PROGRAM, "A, delay 0.1 s"), (data.b[0], OURS, "B"))
     for course, colour, label in lines:
@@ -86,16 +87,14 @@ def _fig1(data: Any) -> Figure:
     for ax, title in zip(axes, ("φ_corr", "φ_vel / v_flock"), strict=False):
         ax.set(xlabel="time, s", title=title, xlim=(0.0, 300.0), ylim=(-0.1, 1.05))
     axes[0].legend(fontsize=8, frameon=False)
-    sweep = data.delays.groupby(level=["delay", "d_wall"])[["phi_corr", "phi_vel"]].mean()
-    for wall, marker in ((10.0, "o"), (25.0, "s")):
-        points = sweep.xs(wall, level="d_wall")
-        name = f"A, d_wall {wall:g} m"
-        axes[2].plot(points["phi_corr"], points["phi_vel"], marker=marker, color=PROGRAM, ms=4, lw=0.8, label=name)
-        for delay, row in points.iterrows() if wall == 25.0 else ():
-            at = (row["phi_corr"] + 0.01, row["phi_vel"] - 0.05)
-            axes[2].annotate(f"{delay:g} s", at, fontsize=7)
-    points = data.points.groupby(level=[0, 1, 2])[["phi_corr", "phi_vel"]].mean()
-    axes[2].plot(points["phi_corr"], points["phi_vel"], ".", color=PAPER, ms=4, label="A, open constants, delay 1 s")
+    points = data.points.groupby(level=["side", "r2"])[["phi_corr", "phi_vel"]].mean()
+    for side, colour in zip(points.index.unique("side"), (PROGRAM, PAPER, "0.5"), strict=False):
+        rows = points.xs(side, level="side")
+        axes[2].plot(rows["phi_corr"], rows["phi_vel"], "o-", color=colour, ms=4, lw=0.8, label=f"A, side {side:g} m")
+        for r2, row in rows.iterrows():
+            axes[2].annotate(f"{r2:g} m", (row["phi_corr"] + 0.01, row["phi_vel"] - 0.05), fontsize=7)
+    box = Rectangle((0.56, 3.22), 0.14, 0.3, fill=False, ls=":", lw=0.8)  # 0.63 ± 0.07 and 3.37 ± 0.15 m/s
+    axes[2].add_patch(box)
     axes[2].errorbar(0.63, 3.37, 0.15, 0.07, fmt="k+", capsize=3, label="A, caption")
     axes[2].errorbar(0.92, 3.83, 0.005, 0.002, fmt="kx", label="B, caption")
     b = data.scores.loc["b"]
