@@ -32,8 +32,8 @@ SCALES = {
     "vicsek_1995": (1.0, "r", 0.3), "couzin_2002": (8.0, "dr_a", 3.0), "kidger": (20.0, "r_align", 10.0),
     "formation": (3.0, "r0_rep", 4.0), "dimock_2003": (5.0, "r_c", 10.0),
     "chen_2014": (3.0, "r_hunt", 1.0), "couzin_2005": (6.0, "rho", 1.0), "olfati_saber_2006": (8.0, "r", 4.0),
-    "cucker_smale_2007": (10.0, "sigma", 4.0), "reynolds_1999": (20.0, "r_c", 4.0), "potential_field": (20.0, "d_1", 4.0),
-    "network": (20.0, "r", 4.0),
+    "cucker_smale_2007": (10.0, "sigma", 4.0), "reynolds_1999": (20.0, "r_c", 4.0), "network": (20.0, "r", 4.0),
+    "potential_field": (20.0, "d_1", 4.0),
 }  # fmt: skip
 BODIES = {
     "velocity": ("multirotor", "quadrotor", "fixed_wing", "direct", "jostled", "autopilot"),

@@ -13,7 +13,6 @@ from airflock.core.model import model
 from airflock.core.vocabulary import Own, Percept
 from airflock.engine import fly_world
 from airflock.parts.laws import (
-    cucker_smale_2007,
     network,
     olfati_saber_2006,
     potential_field,
@@ -280,14 +279,19 @@ def test_forces_of_the_potential_field_are_the_slopes_of_its_potentials():
     for rho in (3.0, 10.0, 29.0):
         slope = (surface(rho + step) - surface(rho - step)) / (2.0 * step)
         assert potential_field.boundary(rho, 1.0, 0.0, 0.0, p).x == pytest.approx(-slope, rel=1e-5)
-    assert potential_field.neighbour(70.0, 0.0, 0.0, 70.0, p).x == potential_field.boundary(31.0, 1.0, 0.0, 0.0, p).x == 0
+    assert (
+        potential_field.neighbour(70.0, 0.0, 0.0, 70.0, p).x == potential_field.boundary(31.0, 1.0, 0.0, 0.0, p).x == 0
+    )
 
 
 @pytest.mark.parametrize("widths", [(), (5,), (18, 2), (7, 18, 4)])
 def test_the_law_network_is_the_network_of_its_layers(widths, seed):
     rng = np.random.default_rng(seed)
     sizes = [network.INPUTS, *widths, network.OUTPUTS]
-    layers = [(rng.normal(0.0, 0.5, (out, into)), rng.normal(0.0, 0.2, out)) for into, out in zip(sizes, sizes[1:])]
+    layers = [
+        (rng.normal(0.0, 0.5, (out, into)), rng.normal(0.0, 0.2, out))
+        for into, out in zip(sizes, sizes[1:], strict=False)
+    ]
     p = network.Parameters(weights=tuple(network.network_weights(layers)), v_max=150.0)
     a = rng.normal(0.0, 1.0, network.INPUTS)
     expected = a

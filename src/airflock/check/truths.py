@@ -321,7 +321,22 @@ for _name in ("neg", "abs", "pos"):
 MATHS = SimpleNamespace(
     **{
         name: (lambda function: lambda *numbers: SinglePrecision(function(*numbers)))(getattr(math, name))
-        for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "pow", "fabs", "fmod", "tanh")
+        for name in (
+            "sqrt",
+            "sin",
+            "cos",
+            "tan",
+            "asin",
+            "acos",
+            "atan",
+            "atan2",
+            "exp",
+            "log",
+            "pow",
+            "fabs",
+            "fmod",
+            "tanh",
+        )
     },
     floor=math.floor,
     ceil=math.ceil,

@@ -454,7 +454,9 @@ def _number_names(kind: type) -> tuple[str, ...]:
 
 def column_places(record: Any) -> tuple[str, ...]:
     """Return "name[k]" of each number of the columns of a record: its places in the row of a driver."""
-    columns = (name for name, declared, _ in declarations(record) if isinstance(declared, Points) and declared.depth == 1)
+    columns = (
+        name for name, declared, _ in declarations(record) if isinstance(declared, Points) and declared.depth == 1
+    )
     return tuple(f"{name}[{k}]" for name in columns for k in range(len(getattr(record, name))))
 
 

@@ -1,4 +1,4 @@
-"""Fig. 1: Algorithm A (Virágh et al. 2014) against Algorithm B at 4 m/s: order, speed, transient, what is not printed."""
+"""Fig. 1: Algorithm A (Virágh et al. 2014) against Algorithm B at 4 m/s: order, speed, transient, the open constants."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -56,9 +56,7 @@ def fly(flights: Flights) -> Data:
         a=flights.courses("Fig. 1, algorithm A", algorithm_a(), 4 * few),
         b=flights.courses("Fig. 1, algorithm B", optimum(4), 4 * few),
         early=flights.courses("Fig. 1, algorithm A, delay 0.1 s", algorithm_a({"radio.delay": 0.1}), few),
-        scores=flights.score(
-            "Fig. 1, scores", {"a": algorithm_a(), "b": optimum(4)}, {"a": 4 * few, "b": 2 * few}
-        ),
+        scores=flights.score("Fig. 1, scores", {"a": algorithm_a(), "b": optimum(4)}, {"a": 4 * few, "b": 2 * few}),
         points=flights.score("Fig. 1, r2 and side of A", points, 4 * few).rename_axis(["r2", "side", "seed"]),
         delays=flights.score("Fig. 1, delay of A", delays, few).rename_axis(["delay", "d_wall", "seed"]),
     )

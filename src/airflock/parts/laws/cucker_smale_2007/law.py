@@ -28,7 +28,9 @@ class Parameters(Record):
     """Strength and range of alignment."""
 
     k: float = quantity(0.05, "1/s", low=0.0, high=1e4, source=OURS, meaning="weight of a neighbour at no distance")
-    sigma: float = quantity(10.0, "m", low=1e-6, high=1e6, source=OURS, meaning="distance up to which weights are equal")
+    sigma: float = quantity(
+        10.0, "m", low=1e-6, high=1e6, source=OURS, meaning="distance up to which weights are equal"
+    )
     beta: float = quantity(
         0.4, "1", low=0.0, high=10.0, source=f"{OURS}: below 1/2", meaning="decay of the weight with distance"
     )

@@ -34,10 +34,14 @@ class Parameters(Record):
     k_v: float = quantity(0.3, "1/s", low=1e-6, high=1e4, source=OURS, meaning="damping")
     v_max: float = quantity(4.0, "m/s", low=0.01, high=1e3, source=OURS, meaning="largest and preferred speed")
     eta: float = quantity(5000.0, "m^4/s^2", low=0.0, high=1e9, source=OURS, meaning="strength of surfaces")
-    rho_0: float = quantity(30.0, "m", low=0.01, high=1e4, source=OURS, meaning="distance at which surfaces begin to act")
+    rho_0: float = quantity(
+        30.0, "m", low=0.01, high=1e4, source=OURS, meaning="distance at which surfaces begin to act"
+    )
     alpha: float = quantity(13.0, "m^2/s^2", low=0.0, high=1e6, source=OURS, meaning="strength of neighbours")
     d_0: float = quantity(35.0, "m", low=0.01, high=1e4, source=OURS, meaning="distance of neighbours at rest")
-    d_1: float = quantity(60.0, "m", low=0.01, high=1e4, source=OURS, meaning="distance beyond which neighbours are free")
+    d_1: float = quantity(
+        60.0, "m", low=0.01, high=1e4, source=OURS, meaning="distance beyond which neighbours are free"
+    )
     r_min: float = quantity(0.5, "m", low=1e-6, high=100.0, source=OURS, meaning="distance below which pushes are even")
     a_max: float = quantity(4.0, "m/s^2", low=0.0, high=1e4, source=OURS, meaning="largest acceleration")
 

@@ -48,7 +48,12 @@ class Parameters(Record):
         10.0, "m", low=0.0, high=1000.0, source=OURS, meaning="how far within r0_rep friction begins to count distance"
     )
     r_min_frict: float = quantity(
-        5.0, "m", low=0.01, high=1000.0, source=FIG1, meaning="distance, counted so, below which friction grows no further"
+        5.0,
+        "m",
+        low=0.01,
+        high=1000.0,
+        source=FIG1,
+        meaning="distance, counted so, below which friction grows no further",
     )
     c_shill: float = quantity(1.0, "1", low=0.0, high=10.0, source=OURS, meaning="strength of the walls")
     v_shill: float = quantity(4.0, "m/s", low=0.0, high=300.0, source=OURS, meaning="speed of the shill agents")
