@@ -1,4 +1,4 @@
-"""Fig. 1: Algorithm A (Virágh et al. 2014) against Algorithm B at 4 m/s: order, speed, transient, the open constants."""
+"""Fig. 1: Algorithm A (Virágh et al. 2014) against Algorithm B at 4 m/s: order, speed, transient, open constants."""
 
 from dataclasses import dataclass
 from itertools import product
