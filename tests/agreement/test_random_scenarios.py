@@ -27,7 +27,7 @@ def test_any_valid_scenario_flies_as_the_reference_does(number):
 
 def test_draws_hold_every_choice_and_every_pair_of_notions():
     """Noisy or not with periodic or not, and so on; `.ci/nightly random-scenarios` flies 5,000 draws and counts too."""
-    assert missing([sorted(notions(drawn(Random(number)))) for number in range(1500)]) == []
+    assert missing([sorted(notions(drawn(Random(number)))) for number in range(2200)]) == []
 
 
 @pytest.mark.parametrize("dims", ["2", "3"])
