@@ -46,6 +46,14 @@ def layers(weights):
     return first, weights[:, HIDDEN * INPUTS :].reshape(-1, HIDDEN + 1, 2)
 
 
+def as_law(weights):
+    """The same network as numbers of the law `network`, whose inputs ours are; a flat one sees and wants nothing up."""
+    first, last = (layer[0] for layer in layers(weights[None]))
+    hidden, wanted = np.zeros((HIDDEN, 18)), np.zeros((3, HIDDEN))
+    hidden[:, [2, 3, 4, 6, 7, 9, 10, 12, 13]], wanted[:2] = first[:-1].T, last[:-1].T
+    return airflock.network_weights([(hidden, first[-1]), (wanted, [*last[-1], 0.0])])
+
+
 def act(weights, parts):
     """Commands of all agents, (flight, agent, axis), by the weights of each flight, (flight, SIZE)."""
     seen, turn = inputs(parts)
@@ -85,4 +93,6 @@ if __name__ == "__main__":
     draws = np.random.default_rng(1).normal(AHEAD, 0.5, (10, SIZE))
     for name, weights in {"random": draws, "trained": np.tile(best, (10, 1))}.items():
         print(f"{name}: fitness of ten new flights {np.round(fly(tests, weights, 10**6), 3)}")
-    print(f"the first of them: phi_vel {tests.episodes.flights.scores(0)['phi_vel']:.2f} m/s")
+    scenario = airflock.load("vasarhelyi_2018/4ms", {**SCENARIO, "model.weights": as_law(best)}, law="network")
+    scores = airflock.score(scenario, seeds=range(10**6, 10**6 + 10))
+    print(f"as the law `network`: fitness {scores['fitness'].mean():.3f}, phi_vel {scores['phi_vel'].mean():.2f} m/s")

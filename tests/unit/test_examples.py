@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airflock import open_many
 from airflock.parts.laws import formation
 from airflock.scenarios.files import load
 from airflock.scenarios.named_code import MODELS
@@ -92,6 +93,16 @@ def test_the_network_of_the_example_turns_with_the_world(gym_env, seed):
     heard, weights = np.ones((3, 5, 7)), rng.normal(0.0, 0.5, (3, gym_env.SIZE))
     one, other = (gym_env.act(weights, SimpleNamespace(**a, heard=heard)) for a in (seen, turned))
     assert other == pytest.approx(one @ quarter.T, abs=1e-9) and np.abs(one).max() > 0.1
+
+
+def test_the_network_of_the_example_is_the_law_network(gym_env, seed):
+    weights = np.random.default_rng(seed).normal(gym_env.AHEAD, 0.5, gym_env.SIZE)
+    settings = {**gym_env.SCENARIO, "agents": 6, "world.side": 200.0, "model.weights": gym_env.as_law(weights)}
+    scenario = load("vasarhelyi_2018/4ms", settings, law="network")
+    flights = open_many(scenario, [seed], neighbours=5, device="python")
+    for _ in range(5):  # 1 s, in which nobody flies beyond a wall, where rays end and the law goes on to feel it
+        assert flights.commands == pytest.approx(gym_env.act(weights[None], flights.percepts), abs=1e-9)
+        flights.advance()
 
 
 @pytest.mark.nightly
