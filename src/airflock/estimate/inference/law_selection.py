@@ -72,7 +72,7 @@ def fit_law(
     start = model.first()
     start[model.named :] = gains
     begin = draw_points(model, start, model.few(), seed)
-    kept = identifiable_indices(model, begin[:EFFECT_POINTS], model.few())
+    kept = identifiable_indices(model, list(begin[:EFFECT_POINTS]), model.few())
     on_progress()
     rest = [*kept, *range(model.named, len(start))]
     model = model.with_parameters([law.numbers[k] for k in kept])
@@ -82,7 +82,7 @@ def fit_law(
     return model, fitted
 
 
-def identifiable_indices(model: FitModel, places: Sequence[Array] | Array, spans: Sequence[int]) -> list[int]:
+def identifiable_indices(model: FitModel, places: Sequence[Array], spans: Sequence[int]) -> list[int]:
     """Return indices of the named numbers that tracks can identify, in order; the others stay at their defaults.
 
     A number is not identifiable if it changes nothing anywhere along its range, such as the limit

@@ -24,6 +24,9 @@ MAX_CLIMB_STEPS = 8  # Gauss-Newton steps
 LONGEST = 0.2  # of a range: largest move of a number in one step
 GAINED = 0.05  # loss; a step that gains less is the last
 SHORTER = 6  # times that a step which gains nothing is tried again, shorter
+# A radius takes a pair in or leaves it out: the likelihood has steps that no slope sees, so single
+# numbers are moved by strides, too.
+STRIDES = (0.03, 0.01, 0.003)  # of a range: moves of one number at a time
 WIDE_SLOPES, FINE_SLOPES = 0, 1  # how slopes are taken
 
 
@@ -110,6 +113,28 @@ def climb_to_maximum(
                 break
             way = finer
     return fit
+
+
+def settle_fit(model: FitModel, fit: Fit, spans: Sequence[int] | None) -> Fit:
+    """Move a fit along one number at a time, by strides that grow shorter, and climb again.
+
+    A radius changes who is a neighbour at once or not at all: the likelihood has steps there, which
+    slopes do not see.
+    """
+    place, lowest = fit.place.copy(), fit.loss
+    for stride in STRIDES:
+        # The gains of the filter come after the named numbers; they make nobody a neighbour, so
+        # they need no strides.
+        for k in [k for k in fit.free if k < model.named]:
+            for move in (stride, -stride):
+                while True:
+                    u = place.copy()
+                    u[k] = min(max(u[k] + move, 0.0), 1.0)
+                    loss = loss_at(model, u, fit.free, spans) if u[k] != place[k] else lowest
+                    if loss >= lowest:
+                        break
+                    place, lowest = u, loss
+    return climb_to_maximum(model, place, fit.free, spans, slopes=(FINE_SLOPES,))
 
 
 # A step of one standard error compromises between the rounding of fine steps and the bends of

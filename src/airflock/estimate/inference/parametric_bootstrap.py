@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter
-from airflock.estimate.inference.likelihood_fit import FINE_SLOPES, Fit, climb_to_maximum
+from airflock.estimate.inference.likelihood_fit import FINE_SLOPES, Fit, climb_to_maximum, settle_fit
 from airflock.estimate.inference.observed_tracks import UNSEEN, SpanTracks, with_positions
 from airflock.estimate.inference.posterior_sample import posterior_ends
 
@@ -165,7 +165,7 @@ def first_noise(model: FitModel, point: Array, spans: Sequence[int]) -> FitNoise
 # next by as much as half of the noise. So the law is flown with noise over a wide range, and curves
 # through all these flights relate the statistics to the noise. The scatter about the curves gives
 # the uncertainty (a synthetic likelihood: Wood 2010).
-FLOWN = 40  # flights of each look
+FLOWN = 30  # flights of each look
 RANGE = (3.0, 0.7, 0.3)  # of the logarithms of noise: the law's, at the first look; own speed's and the tracks'
 NARROW = 0.15  # at later looks, at least
 BESIDE = 1.25  # of the interval: range of the next look
@@ -242,8 +242,9 @@ def _look(
     return steps, ends
 
 
-ROUNDS = (4, 10)  # flights of each round; the last gives the intervals
-LONGEST = 0.1  # of a range: move of a number that is put right, in one round
+ROUNDS = (4, 10)  # flights of each round, and of the last, which gives the intervals
+MOST = 6  # rounds
+LONGEST, SETTLED = 0.1, 0.03  # of a range: move of a number that is put right in one round; before the last round
 STEPS = 6  # of a climb
 # Relative standard deviations of what flights leave out, of numbers and of noise, such as where
 # steps of the motion fall between frames. Measured on tracks of known laws
@@ -295,21 +296,27 @@ def correct_fit(
     place, misses, generator = fitted.copy(), np.zeros((1, len(fitted))), np.random.default_rng(len(spans))
     # Noise and numbers go together, as that of a heading and the limit of its turns: each is put
     # right in turn. How far fits miss depends on the law, so laws are flown that explain the tracks as well.
-    for count in ROUNDS:
+    settled = False
+    for turn in range(MOST):
+        last = settled or turn == MOST - 1
         noise, _ = estimate_noise(flights, place, scatter, noise, fitted, levels, len(spans))
         found = []
-        for number in range(count):
+        for number in range(ROUNDS[last]):
             law = np.clip(place + scatter[generator.integers(len(scatter))], 0.0, 1.0)
-            twin = flights.fly(law, noise, 100 * count + number)
+            twin = flights.fly(law, noise, 100 * turn + number)
             # From the law itself, or from where fits of such laws have ended, whichever is likelier.
             starts = law, np.clip(fitted + law - place, 0.0, 1.0)
             start = starts[int(np.argmin([twin.score(u, spans).loss() for u in starts]))]
             end = climb_to_maximum(twin, start, fit.free, spans, STEPS, slopes=(FINE_SLOPES,))
-            found.append(end.place - law)
+            found.append(settle_fit(twin, end, spans).place - law)
             on_progress()
         misses = np.array(found)
         moved = fitted[named] - np.median(misses[:, named], axis=0)
+        # A limit of turns that explains noise is put right by many short moves, and others follow it.
+        settled = bool((np.abs(moved.clip(0.0, 1.0) - place[named]) < SETTLED).all())
         place[named] = np.clip(moved, place[named] - LONGEST, place[named] + LONGEST).clip(0.0, 1.0)
+        if last:
+            break
     deviations = misses.std(axis=0, ddof=1)
     slopes = [n.slope(float(x)) / max(n.value(float(x)), 1e-9) for n, x in zip(model.numbers, place, strict=True)]
     down, up = posterior_ends(draws, levels[0])
