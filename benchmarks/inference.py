@@ -1,12 +1,13 @@
 """Which law made the tracks? Recordings by plain NumPy that shares no text with the engine, judged in one table.
 
-    python benchmarks/inference.py FOLDER [--set development|judging|walks] [--first 0] [--count 30] [--naming]
-        [--topologies metric,nearest]
+    python benchmarks/inference.py FOLDER [--set development|judging|walks] [--first 0] [--count 30]
+        [--naming | --alone] [--topologies metric,nearest]
 
 A seed draws everything: the law (Vicsek, Couzin, boids, Vásárhelyi with lag, alignment with the 7 nearest), its
 numbers, individuals, frames, rate, size, tracking error, gaps and entries. Seeds of `judging` are never used to
 develop; `walks` are individuals that go about by themselves, half of them in a dish that is known. One line of JSON
-per recording in FOLDER; goes on where it stopped. `--naming` names the law and stops before the intervals.
+per recording in FOLDER; goes on where it stopped. `--naming` names the law and stops before the intervals;
+`--alone` offers nothing but the law that made the tracks: its intervals alone.
 """
 
 import argparse
@@ -218,11 +219,14 @@ def holds(value, low, high):
     return (low is None or low <= value) and (high is None or value <= high)
 
 
-def run(which, number, naming, topologies):
+def run(which, number, naming, alone, topologies):
     """One recording as a row."""
     tracks, family, truth, known = draw(which, number)
     began = time.process_time()
-    if naming:
+    if alone:
+        own, *kind = LAWS_OF[family].split(", ")
+        result = airflock.infer(tracks, [own], settings=known, topologies=kind or ["metric"], check=0)
+    elif naming:
         result = law_inference.name_law(tracks, law_inference.LAWS, known, topologies)[0]
     else:
         result = airflock.infer(tracks, settings=known, topologies=topologies, check=20)
@@ -256,14 +260,17 @@ def main():
     ask.add_argument("--first", type=int, default=0)
     ask.add_argument("--count", type=int, default=30)
     ask.add_argument("--naming", action="store_true")
+    ask.add_argument("--alone", action="store_true")
     ask.add_argument("--topologies", default="metric,nearest")
     given = ask.parse_args()
+    if given.alone and (given.naming or given.which == "walks"):
+        ask.error("--alone is for the intervals of a law: neither with --naming nor for walks")
     given.folder.mkdir(parents=True, exist_ok=True)
-    file = given.folder / f"{given.which}{'_naming' if given.naming else ''}.jsonl"
+    file = given.folder / f"{given.which}{'_naming' * given.naming}{'_alone' * given.alone}.jsonl"
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     for number in range(given.first, given.first + given.count):
         if all(row["number"] != number for row in rows):
-            rows.append(run(given.which, number, given.naming, given.topologies.split(",")))
+            rows.append(run(given.which, number, given.naming, given.alone, given.topologies.split(",")))
             with file.open("a") as out:
                 out.write(json.dumps(rows[-1]) + "\n")
             print(json.dumps(rows[-1]), flush=True)
