@@ -19,7 +19,7 @@ from airflock.estimate.inference.likelihood_fit import (
     loss_at,
 )
 from airflock.estimate.inference.parametric_bootstrap import FitNoise
-from airflock.estimate.inference.posterior_sample import posterior_ends, sample_posterior, search_widely
+from airflock.estimate.inference.posterior_sample import posterior_ends, sample_posterior, search_onward, search_widely
 from line_laws import STEPS, Line, quietly
 
 
@@ -121,7 +121,7 @@ def test_the_part_of_one_radius_is_taken_by_another_of_its_unit(monkeypatch):
 
 def ends(model, fit, level=0.975):
     """The fit that a sample returns, and the ends of all numbers."""
-    fit, draws = sample_posterior(model, fit, [0], quietly)
+    fit, draws = sample_posterior(model, *search_onward(model, fit, [0], quietly), [0], quietly)
     return fit, posterior_ends(draws, level)
 
 
@@ -186,7 +186,7 @@ def test_a_ridge_is_gone_along_to_what_is_likelier():
     beside = climb_to_maximum(model, np.array([0.2, 0.2]), [0, 1], slopes=(FINE_SLOPES,))
     best = climb_to_maximum(model, np.array([0.83, 0.83]), [0, 1])
     assert beside.loss > best.loss + 7.0
-    assert sample_posterior(model, beside, [0], quietly)[0].loss < best.loss + 0.5
+    assert search_onward(model, beside, [0], quietly)[0].loss < best.loss + 0.5
 
 
 def test_a_bent_ridge_is_followed_by_fine_slopes():
@@ -234,8 +234,8 @@ def test_a_number_is_told_beside_a_few_steps_that_went_another_way():
     model = Line(lambda x, a, b: a * x + b, ("a", "b"), (0.5, 0.5))
     model.seen = model.seen + np.where(np.arange(STEPS) % 20 == 7, 1.0, 0.0)
     plain, less = (abs(climb_to_maximum(each, each.start(), [0, 1]).place[1] - 0.5) for each in (model, model.robust()))
-    draws = sample_posterior(model.robust(), climb_to_maximum(model, model.start(), [0, 1]), [0], quietly)[1]
-    error = draws.std(axis=0)[1]
+    beside = search_onward(model.robust(), climb_to_maximum(model, model.start(), [0, 1]), [0], quietly)
+    error = sample_posterior(model.robust(), *beside, [0], quietly)[1].std(axis=0)[1]
     assert plain > 4.0 * error > 2.0 * less
 
 

@@ -31,7 +31,7 @@ from airflock.estimate.inference.observed_tracks import (
     tracks_scale,
 )
 from airflock.estimate.inference.parametric_bootstrap import CorrectedFit, FitNoise, correct_fit
-from airflock.estimate.inference.posterior_sample import sample_posterior
+from airflock.estimate.inference.posterior_sample import sample_posterior, search_onward
 from airflock.recordings import load_recording, load_tracks
 from airflock.scenarios import CallerParts, Scenario, build_scenario
 from airflock.support import AirflockError, RecordingError, expand_path, interval_lines, result_group, result_table
@@ -583,11 +583,12 @@ class _Comparison:
         say = _teller(self.say, f"{law.name}, sampled")
         plain = FitModel(law.candidate, self.followed, self.scale)
         whole = plain.robust()
-        fit, draws = sample_posterior(whole, law.fit, self.spans, say)
+        fit, places = search_onward(whole, law.fit, self.spans, say)
         self.complete(law, plain, climb_to_maximum(plain, fit.place, fit.free, self.spans))
         model, fit = law_selection.drop_redundant(whole, fit, say)
-        if model is not whole:
-            fit, draws = sample_posterior(model, fit, self.spans, say)
+        kept = [n in model.numbers for n in whole.numbers[: whole.named]]
+        places = places[:, [*kept, *[True] * (len(whole.numbers) - whole.named)]]
+        fit, draws = sample_posterior(model, fit, places, self.spans, say)
         return model, fit, draws
 
     def complete(self, law: LawResult, model: FitModel, fit: Fit) -> None:

@@ -35,24 +35,41 @@ def search_widely(
     return min(ends, key=lambda end: end.loss)
 
 
-def sample_posterior(
+def search_onward(
     model: FitModel, fit: Fit, spans: Sequence[int], on_progress: Callable[[], None]
 ) -> tuple[Fit, Array]:
-    """Return the likeliest fit, and draws of all numbers (draw, number) by their likelihood and the prior."""
-    g, d = np.random.default_rng(len(spans)), len(fit.free)
+    """Search from a fit, also for other hills that are as likely; return the best one, and places on these hills."""
     fit = climb_to_maximum(model, fit.place, fit.free, spans)
-    begin = np.tile(fit.place, (BEGIN * d, 1))
-    hessian = curvature(model, fit, spans, model.differences(fit.place, spans)[0])[0] + 4.0 * np.eye(d)
-    begin[1:, fit.free] += g.multivariate_normal(np.zeros(d), np.linalg.inv(hessian), len(begin) - 1)
-    # Heated first, so that other hills which are as likely are among the places that moves are made of.
-    count = SEARCH * max(d, LEAST)
-    best, warm = evolve(model, np.clip(begin, 0.0, 1.0), fit.free, spans, count, 0, on_progress, HEAT)
-    begin[::2] = warm[np.linspace(2 * count // 3, count - 1, len(begin[::2])).astype(int)]
-    begin[0] = min(best, (fit.loss, fit.place), key=lambda each: each[0])[1]
-    best, draws = evolve(model, np.clip(begin, 0.0, 1.0), fit.free, spans, LENGTH * max(d, LEAST), 0, on_progress)
+    count = SEARCH * max(len(fit.free), LEAST)
+    best, draws = evolve(model, _around(model, fit, spans), fit.free, spans, count, 0, on_progress, HEAT)
+    if best[0] < fit.loss - HIGHER:
+        fit = climb_to_maximum(model, best[1], fit.free, spans)
+    return fit, draws[np.linspace(2 * count // 3, len(draws) - 1, BEGIN * len(fit.free) // 2).astype(int)]
+
+
+def sample_posterior(
+    model: FitModel, fit: Fit, places: Array, spans: Sequence[int], on_progress: Callable[[], None]
+) -> tuple[Fit, Array]:
+    """Return the likeliest fit, and draws of all numbers (draw, number) by their likelihood and the prior.
+
+    places : others that may be as likely, of which moves are made, too
+    """
+    count = LENGTH * max(len(fit.free), LEAST)
+    begin = np.concatenate([_around(model, fit, spans), places])
+    best, draws = evolve(model, begin, fit.free, spans, count, 0, on_progress)
     if best[0] < fit.loss - HIGHER:
         fit = climb_to_maximum(model, best[1], fit.free, spans)
     return fit, draws[len(draws) // 3 :]
+
+
+def _around(model: FitModel, fit: Fit, spans: Sequence[int]) -> Array:
+    """Draw places around a fit, itself first, by the curvature there."""
+    d = len(fit.free)
+    found = np.tile(fit.place, (BEGIN * d // 2, 1))
+    hessian = curvature(model, fit, spans, model.differences(fit.place, spans)[0])[0] + 4.0 * np.eye(d)
+    generator = np.random.default_rng(len(spans))
+    found[1:, fit.free] += generator.multivariate_normal(np.zeros(d), np.linalg.inv(hessian), len(found) - 1)
+    return np.clip(found, 0.0, 1.0)
 
 
 def evolve(
