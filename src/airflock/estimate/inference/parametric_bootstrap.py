@@ -242,9 +242,8 @@ def _look(
     return steps, ends
 
 
-ROUNDS = (4, 10)  # flights of each round, and of the last, which gives the intervals
-MOST = 6  # rounds
-LONGEST, SETTLED = 0.1, 0.03  # of a range: move of a number that is put right in one round; before the last round
+ROUNDS = (4, 4, 4, 4, 10)  # flights of each round; the last gives the intervals
+LONGEST = 0.1  # of a range: move of a number that is put right, in one round
 STEPS = 6  # of a climb
 # Relative standard deviations of what flights leave out, of numbers and of noise, such as where
 # steps of the motion fall between frames. Measured on tracks of known laws
@@ -296,12 +295,10 @@ def correct_fit(
     place, misses, generator = fitted.copy(), np.zeros((1, len(fitted))), np.random.default_rng(len(spans))
     # Noise and numbers go together, as that of a heading and the limit of its turns: each is put
     # right in turn. How far fits miss depends on the law, so laws are flown that explain the tracks as well.
-    settled = False
-    for turn in range(MOST):
-        last = settled or turn == MOST - 1
+    for turn, count in enumerate(ROUNDS):
         noise, _ = estimate_noise(flights, place, scatter, noise, fitted, levels, len(spans))
         found = []
-        for number in range(ROUNDS[last]):
+        for number in range(count):
             law = np.clip(place + scatter[generator.integers(len(scatter))], 0.0, 1.0)
             twin = flights.fly(law, noise, 100 * turn + number)
             # From the law itself, or from where fits of such laws have ended, whichever is likelier.
@@ -313,10 +310,7 @@ def correct_fit(
         misses = np.array(found)
         moved = fitted[named] - np.median(misses[:, named], axis=0)
         # A limit of turns that explains noise is put right by many short moves, and others follow it.
-        settled = bool((np.abs(moved.clip(0.0, 1.0) - place[named]) < SETTLED).all())
         place[named] = np.clip(moved, place[named] - LONGEST, place[named] + LONGEST).clip(0.0, 1.0)
-        if last:
-            break
     deviations = misses.std(axis=0, ddof=1)
     slopes = [n.slope(float(x)) / max(n.value(float(x)), 1e-9) for n, x in zip(model.numbers, place, strict=True)]
     down, up = posterior_ends(draws, levels[0])
