@@ -16,7 +16,7 @@ from processes import called
 
 SMALL = {
     "agents": 6, "duration": 120.0, "world.side": 70.0, "sensors.kind": "perfect", "body.noise": 0.05,
-    "radio.delay": 0.2,
+    "radio.delay": 0.2, "metrics.kind": "contacts",  # as futures are measured: all flights share their drivers
 }  # fmt: skip
 GAS = {"model.p_rep": 0.0, "model.c_frict": 0.0}  # agents that no rule keeps apart: the radio is not read
 FUTURES = 60
@@ -86,6 +86,14 @@ def test_futures_are_the_same_whatever_the_threads_and_differ_between_seeds_of_f
     for text in (shown.getvalue(), one._repr_html_(), repr(one)):  # each shows the sentence
         assert one.event.split("(")[0] in text
     assert airflock.why(scenario, second, futures=FUTURES).rows != one.rows
+
+
+def test_an_explanation_is_the_same_whatever_the_metrics_of_its_scenario():
+    scenario = with_fault("radio_silent")
+    seed, options = hits(scenario, 1)[0], {"futures": 10, "leads": [4.0]}
+    usual = with_settings(scenario, {"metrics.kind": "vasarhelyi"})
+    assert usual.metrics.kind != scenario.metrics.kind
+    assert airflock.why(usual, seed, **options).rows == airflock.why(scenario, seed, **options).rows
 
 
 def test_a_recording_is_explained_as_its_flight_and_a_changed_one_is_refused(tmp_path):
