@@ -88,14 +88,14 @@ def tune(folder):
     from airflock.scenarios import build_scenario
 
     tuning = import_module("airflock.search.tuning_run")
-    tuning.measure_flight_rate = lambda *_: 300.0
+    tuning.measure_flight_rate = lambda *_: 1000.0  # about the least plan: six generations, ten flights of a step
     import_module("airflock.search.evolution").draw_study = lambda *_: None
     import_module("airflock.search.tune_report").save = lambda found: atomic.write_file(
         found.folder / "report.html", repr(found)
     )
     # the limit is shown after its first looks, whatever the time
     resume = (folder / REQUEST_FILE).is_file()
-    tuning.tune(build_scenario(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 20%"], resume=resume)
+    tuning.tune(build_scenario(MINE, "mine"), folder, budget=1.0, limit=["r_min<0.1 at 20%"], resume=resume)
 
 
 def of_tuning(folder):
@@ -162,6 +162,12 @@ def studio(folder):
     player.save_replay(folder / "tuned.html")
 
 
+# Imported before the first life: each dies at its work, not at imports, which cost more than it.
+HEAVY = {
+    "evolve": ("cma",),
+    "tune": ("cma", "fontTools.subset", "airflock.engine.compiler", "airflock.search.tune_report"),
+}
+
 LIVES = {
     "evolve": (evolve, of_study),
     "certify": (certify, of_certificate),
@@ -188,6 +194,8 @@ def child(life, folder):
 def killed(what, folder, kills, seed):
     """Kill lives until so many have died; a line for each study that came to its end, and the sum."""
     life, contents = LIVES[what]
+    for name in HEAVY.get(what, ()):
+        import_module(name)
     folder.mkdir(parents=True, exist_ok=True)
     kept = folder / "done.json"
     done = json.loads(kept.read_text()) if kept.exists() else {"kills": 0, "studies": 0, "usual": None}
