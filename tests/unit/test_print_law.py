@@ -248,12 +248,14 @@ def test_a_law_of_ones_own_with_vectors_a_memory_and_draws_gives_the_bits_of_pla
     assert "#define mine_START {R(0.25)}" in files[0].read_text()
 
 
-def test_stubs_come_only_with_laws_that_call_nothing_of_a_percept(tmp_path):
+def test_stubs_come_only_with_laws_that_call_nothing_of_a_percept_and_the_bare_one_compiles(tmp_path):
     """The percept of a stub has no functions: a law that calls one would jump to address zero on board."""
     for law in PRINTED:
         files = print_law(law, out=tmp_path / law)
         if any("stub" in file.name for file in files):
             assert "percept->context" not in files[1].read_text(), law
+            bare = [*STRICT, "-c", tmp_path / law / "stub_stm32.c", "-o", tmp_path / "stub.o"]
+            subprocess.run(["gcc", *bare], check=True)
 
 
 def test_the_replay_of_a_law_fails_where_c_gives_another_number_or_none(tmp_path):

@@ -1,5 +1,6 @@
 /* @LAW@ in an app of the Crazyflie firmware: peers' states by peer-to-peer radio, set-points of velocity.
- * Written from the firmware's documentation; neither compiled with it nor flown. Copy @LAW@.c and @LAW@.h beside it.
+ * Compiled against the firmware's headers (August 2026); neither linked with it nor run nor flown. Copy @LAW@.c and
+ * @LAW@.h beside it. It sends set-points only while the parameter flock.fly is 1.
  */
 #include <string.h>
 
@@ -8,14 +9,16 @@
 #include "commander.h"
 #include "configblock.h"
 #include "log.h"
+#include "param.h"
 #include "radiolink.h"
 #include "task.h"
 
 #include "@LAW@.h"
 
-#define FLOCK 10         /* drones; each has the last byte of its radio address as its number */
+#define FLOCK 10         /* drones; the last byte of the radio address is the number, from 0 to FLOCK - 1 */
 #define PERIOD_MS 100
 #define FORGET_MS 1000   /* a peer that has been silent for so long counts no more */
+#define HEIGHT 1.0f      /* m; it is held, and what the law commands upwards is not flown */
 
 typedef struct {
   uint8_t who;
@@ -24,14 +27,21 @@ typedef struct {
 
 static @LAW@_Heard heard[FLOCK];
 static TickType_t heard_at[FLOCK];
+static uint8_t fly;
+
+PARAM_GROUP_START(flock)
+PARAM_ADD(PARAM_UINT8, fly, &fly)
+PARAM_GROUP_STOP(flock)
 
 static void receive(P2PPacket *packet) {
   Packet peer;
   if (packet->size != sizeof peer) return;
   memcpy(&peer, packet->data, sizeof peer);
   if (peer.who >= FLOCK) return;
+  taskENTER_CRITICAL();  /* the app's task reads them, too */
   heard[peer.who] = (@LAW@_Heard){{peer.x, peer.y, peer.z, peer.vx, peer.vy, peer.vz}, 0.0f, peer.who, -1.0f};
   heard_at[peer.who] = xTaskGetTickCount();
+  taskEXIT_CRITICAL();
 }
 
 void appMain(void) {
@@ -40,6 +50,7 @@ void appMain(void) {
   const logVarId_t places[6] = {
       logGetVarId("stateEstimate", "x"), logGetVarId("stateEstimate", "y"), logGetVarId("stateEstimate", "z"),
       logGetVarId("stateEstimate", "vx"), logGetVarId("stateEstimate", "vy"), logGetVarId("stateEstimate", "vz")};
+  bool flying = false;
   p2pRegisterCB(receive);
   for (;;) {
     vTaskDelay(M2T(PERIOD_MS));
@@ -52,12 +63,20 @@ void appMain(void) {
 
     @LAW@_Heard near[FLOCK];
     int count = 0;
+    taskENTER_CRITICAL();
     for (int i = 0; i < FLOCK; i++) {
       const TickType_t age = xTaskGetTickCount() - heard_at[i];
       if (i == who || heard_at[i] == 0 || age > M2T(FORGET_MS)) continue;
       near[count] = heard[i];
       near[count++].age = (float)age / (float)configTICK_RATE_HZ;
     }
+    taskEXIT_CRITICAL();
+    if (!fly || who >= FLOCK) {  /* peers ignore a number that is too large, so such a drone stays down */
+      if (flying) commanderRelaxPriority();
+      flying = false;
+      continue;
+    }
+    flying = true;
     const @LAW@_State state = {v[0], v[1], v[2], v[3], v[4], v[5]};
     const @LAW@_Percept percept = {0};
     /* TO DO: the surfaces of your room; take-off, landing and what ends the flight are yours, too. */
@@ -68,7 +87,7 @@ void appMain(void) {
     setpoint.mode.yaw = modeVelocity;
     setpoint.velocity.x = wish.v0;
     setpoint.velocity.y = wish.v1;
-    setpoint.position.z = 1.0f;
+    setpoint.position.z = HEIGHT;
     commanderSetSetpoint(&setpoint, 3);
   }
 }

@@ -1,4 +1,4 @@
-/* @LAW@ on a bare microcontroller: a loop that decides ten times a second. Not run.
+/* @LAW@ on a bare microcontroller: a loop that decides ten times a second. Compiled for a Cortex-M4, not run.
  * The four functions below are yours: they read a clock, the own state and the radio, and send a set-point.
  */
 #include "@LAW@.h"
@@ -14,7 +14,7 @@ extern void send_setpoint(real x, real y, real z);
 int main(void) {
   const @LAW@_Parameters numbers = @LAW@_DEFAULTS;
   const @LAW@_Percept percept = {0};
-  const int who = 0;
+  const int who = 0;  /* TO DO: each drone's own number */
   unsigned due = milliseconds();
   for (;;) {
     while ((int)(milliseconds() - due) < 0) {
