@@ -8,6 +8,7 @@ import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,30 +30,18 @@ from airflock.core import (
     vector_sizes,
 )
 from airflock.engine.text.c99 import PRELUDE, REAL, WHOLE, CPrinter, Function, fits_float
+from airflock.engine.text.rewrite import RuleRewriter
 from airflock.scenarios import MODELS, Scenario, find_law, scenario_variant
 from airflock.support import AirflockError, RuleError, as_error, expand_path, suggest, to_identifier
 
 # The rules that are printed of each kind, and the letter of its numbers. Others (`flock`, `limits`,
 # `lasts`, `see`) speak of a whole flock or scenario.
-KINDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "law": (
-        "p",
-        (
-            "preferred_speed",
-            "interaction_range",
-            "reach",
-            "sight",
-            "wall_reach",
-            "neighbour",
-            "boundary",
-            "decide",
-            "steer",
-        ),
-    ),
-    "body": ("b", ("move", "endures")),
-    "sensor": ("s", ("measure", "error")),
-    "radio": ("k", ("missed", "late", "carry", "receive")),
-    "fault": ("f", tuple(FAULT_RULES)),
+KINDS: Mapping[str, tuple[str, str]] = {
+    "law": ("p", "preferred_speed interaction_range reach sight wall_reach neighbour boundary decide steer"),
+    "body": ("b", "move endures"),
+    "sensor": ("s", "measure error"),
+    "radio": ("k", "missed late carry receive"),
+    "fault": ("f", " ".join(FAULT_RULES)),
 }
 RECORDS = {"sums": "Sums", "walls": "Walls", "memory": "Memory", "packet": "Packet"}  # argument → record of the part
 STUBS = ("crazyflie.c", "stm32.c", "px4.cpp")
@@ -182,7 +171,7 @@ def printed_part(
         if scenario.dimensions == 2:
             notes.append("The scenario flies in a plane: set z and vz of all states to 0.")
         kind = "fault" if part in faults else part
-    letter, names = KINDS[kind]
+    letter, names = KINDS[kind][0], KINDS[kind][1].split()
     if getattr(rules, "flock", None) is not None or getattr(rules, "added", None) is not None:
         raise RuleError(
             f"{rules.name} solves for the whole flock at once, which no single drone can do; it is not printed"
@@ -272,41 +261,18 @@ def source_text(printed: PrintedPart) -> str:
     return "\n".join([*lines, *([decision, ""] if decision else [])])
 
 
-class _PairNames(ast.NodeTransformer):
-    """Writes the arguments of a pair as C has them: of the heard neighbour each field by itself; free : other names."""
-
-    def __init__(self, free: Mapping[str, ast.expr]):
-        self.free = free
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Write heard.age as age, and so on."""
-        if isinstance(node.value, ast.Name) and node.value.id == "heard":
-            return ast.Name({"group": "heard_group"}.get(node.attr, node.attr), ast.Load())
-        return node
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        """Write the guard of a square as its number, and a length by its function in C."""
-        return self.free.get(node.id, node)
-
-
-def _pair_function(printed: PrintedPart, wanted: Sequence[str]) -> None:
-    """Print what a rule of neighbours asks for, from the text by which a pilot computes it on board."""
+def _pair_function(printed: PrintedPart, wanted: Sequence[str], types: Sequence[str]) -> str:
+    """Print what a rule of neighbours asks for, from the text by which a pilot computes it; return its name in C."""
     printer, name = printed.printer, f"{printed.name}_pair"
-    free = {"TINY": ast.Constant(TINY), "norm": ast.Name(printer.source.name(norm), ast.Load())}
-    tree = tree_of(pair_arguments)
-    last = tree.body[-1]
-    assert isinstance(last, ast.Return) and isinstance(last.value, ast.Dict)
-    values = {key.value: value for key, value in zip(last.value.keys, last.value.values, strict=True)}  # type: ignore[union-attr]
-    body = [item for item in tree.body if isinstance(item, ast.Assign) and "heard" not in ast.unparse(item)]
-    call = ast.Call(ast.Name(f"{printed.name}_Pair", ast.Load()), [values[each] for each in wanted], [])
-    names = ("own", "other", "age", "who", "heard_group", "index", "group")
-    arguments = ast.arguments([], [ast.arg(each) for each in names], None, [], [], None, [])
-    function = ast.FunctionDef(name, arguments, [*body, ast.Return(call)], [], lineno=1)
-    text = ast.unparse(ast.fix_missing_locations(_PairNames(free).visit(function)))
-    printer.record(f"{printed.name}_Pair", wanted)
-    printer.source.blocks.append(text)
-    state = printer.record(f"{printed.name}_State", State._fields)
-    printer.called(name, [state, state, REAL, WHOLE, REAL, WHOLE, REAL])
+    rewriter = RuleRewriter(pair_arguments, printer.source, {})
+    *body, last = (rewriter.visit(each) for each in tree_of(pair_arguments).body)
+    # C has no dict: in its place stands a record of those that the rule takes.
+    values = {ast.literal_eval(key): value for key, value in zip(last.value.keys, last.value.values, strict=True)}
+    pair = ast.Name(printer.record(f"{printed.name}_Pair", wanted), ast.Load())
+    names = ast.arguments([], [ast.arg(each) for each in ("own", "heard", "index", "group")], None, [], [], None, [])
+    body.append(ast.Return(ast.Call(pair, [values[each] for each in wanted], [])))
+    printer.trees[name] = ast.FunctionDef(name, names, body, [])
+    return printer.called(name, types).name
 
 
 def command_text(printed: PrintedPart) -> str:
@@ -322,10 +288,10 @@ def command_text(printed: PrintedPart) -> str:
         "  (void)own;",
     ]
     printer.called(printer.source.name(norm), [REAL] * 3)
-    printer.struct(f"{name}_Heard", {"state": printer.record(f"{name}_State", State._fields),
+    heard = printer.struct(f"{name}_Heard", {"state": printer.record(f"{name}_State", State._fields),
                                      "age": REAL, "who": WHOLE, "group": REAL})  # fmt: skip
     printer.record(f"{name}_Surface", ("distance", "nx", "ny", "nz"))
-    for record, argument, count, kind in (
+    for record, argument, many, kind in (
         ("Sums", "sums", "neighbours", "neighbour"),
         ("Walls", "walls", "walls_near", "boundary"),
     ):
@@ -338,30 +304,25 @@ def command_text(printed: PrintedPart) -> str:
         function = printed.functions.get(kind)
         if function is None:
             continue
-        lines.append(f"  for (int i = 0; i < {count}; i++) {{")
+        lines.append(f"  for (int i = 0; i < {many}; i++) {{")
         given = [each for each in function.arguments if each != "p"]
-        near = "  "
         if kind == "neighbour":
             wanted = list(dict.fromkeys([*given, "r2"]))
-            _pair_function(printed, wanted)
-            lines.append(f"    const {name}_Heard *other = &heard[i];")
-            given_pair = "state, &other->state, other->age, other->who, other->group, index, group"
-            lines.append(f"    const {name}_Pair pair = {name}_pair({given_pair});")
+            pair = _pair_function(printed, wanted, [f"{name}_State", heard, WHOLE, REAL])
+            lines.append(f"    const {name}_Pair pair = {pair}(state, &heard[i], index, group);")
             if "reach" in printed.functions:
                 lines.append(f"    const real near = {printed.functions['reach'].name}(p);")
                 lines.append(f"    if (!(pair.r2 <= near * near + R({TINY!r}))) continue;")
-            values = [f"pair.{each}" for each in given]
+            places = {each: f"pair.{each}" for each in given}
         else:
-            values = [f"state->{each}" if each in State._fields else f"surfaces[i].{each}" for each in given]
-        places = dict(zip(given, values, strict=True)) | {"p": "p"}
-        values_in_order = ", ".join(places[each] for each in function.arguments)
-        lines.append(f"  {near}const {struct_name} term = {function.name}({values_in_order});")
+            places = {each: f"state->{each}" if each in State._fields else f"surfaces[i].{each}" for each in given}
+        handed = ", ".join(places.get(each, each) for each in function.arguments)
+        lines.append(f"    const {struct_name} term = {function.name}({handed});")
         for each in fields:
-            way = how.get(each, "sum")
             total, value = f"{argument}.{each}", f"term.{each}"
-            more = f"{total} + {value}" if way == "sum" else f"{'least' if way == 'min' else 'most'}({total}, {value})"
-            printer.used |= {"least" if way == "min" else "most"} if way != "sum" else set()
-            lines.append(f"  {near}{total} = {more};")
+            called = {"min": "least", "max": "most"}.get(how.get(each, "sum"))
+            printer.used |= {called} if called else set()
+            lines.append(f"    {total} = " + (f"{called}({total}, {value});" if called else f"{total} + {value};"))
         lines.append("  }")
     places = {each: f"&{each}" for each in ("own", "sums", "walls")}
     made = f"{rule.name}({', '.join(places.get(each, each) for each in rule.arguments)})"
@@ -409,13 +370,13 @@ class CasePercept(Percept):
         return 0.125 + 0.03125 * draw
 
 
-def cases_of(printed: PrintedPart, count: int, seed: int = 0) -> bytes:
+def cases_of(printed: PrintedPart, size: int, seed: int = 0) -> bytes:
     """Return so many cases of each rule as doubles: its arguments, then the answers of plain Python."""
     rng, found = random.Random(seed), bytearray()
     for name, rule in printed.rules.items():
-        found += struct.pack("<d", count)
+        found += struct.pack("<d", size)
         done = 0
-        for _ in range(50 * count):
+        for _ in range(50 * size):
             given = drawn_arguments(printed, name, rng)
             try:
                 row = _flat((*given.values(), rule(*given.values())))
@@ -424,7 +385,7 @@ def cases_of(printed: PrintedPart, count: int, seed: int = 0) -> bytes:
             if all(math.isfinite(each) for each in row):
                 found += struct.pack(f"<{len(row)}d", *row)
                 done += 1
-            if done == count:
+            if done == size:
                 break
         else:
             raise RuleError(f"{printed.printer.place(printed.functions[name].name)}: gives hardly ever a finite number")
@@ -444,9 +405,8 @@ def drawn_arguments(printed: PrintedPart, name: str, rng: random.Random) -> dict
     if rng.random() < 0.5:
         about = {key: declared for key, declared, _ in declarations(numbers) if isinstance(declared, Quantity)}
         moved = {key: getattr(numbers, key) * rng.uniform(0.5, 1.5) for key in about}
-        numbers = type(numbers)(
-            **vars(numbers) | {k: min(max(v, about[k].low), about[k].high) for k, v in moved.items()}
-        )
+        within = {key: min(max(value, about[key].low), about[key].high) for key, value in moved.items()}
+        numbers = type(numbers)(**vars(numbers) | within)
     own, heard = (State(*(rng.gauss(0.0, 25.0 if axis in "xyz" else 4.0) for axis in State._fields)) for _ in range(2))
     values: dict[str, Any] = pair_arguments(own, HeardNeighbour(rng.randrange(9), heard, rng.expovariate(1.0)), 4)
     normal = [rng.gauss(0.0, 1.0) for _ in range(3)]
@@ -465,11 +425,8 @@ def drawn_arguments(printed: PrintedPart, name: str, rng: random.Random) -> dict
     values |= {each: float(rng.randrange(most)) for each, most in (("talkers", 20), ("step", 1000), ("clear", 2))}
     values |= {each: rng.expovariate(0.1) for each in ("since", "reach", "age")}
     values |= {f"u{c}": rng.random() for c in range(4)}
-
-    def number(argument: str) -> float:
-        return rng.gauss(0.0, 1.0 if argument.startswith("g") else 5.0)
-
-    return {each: values[each] if each in values else number(each) for each in printed.functions[name].arguments}
+    return {each: values[each] if each in values else rng.gauss(0.0, 1.0 if each.startswith("g") else 5.0)
+            for each in printed.functions[name].arguments}  # fmt: skip
 
 
 def test_text(printed: PrintedPart) -> str:
@@ -479,36 +436,26 @@ def test_text(printed: PrintedPart) -> str:
     takes = any(percept in function.arguments.values() for function in printed.functions.values())
     lines = [_template("test_percept.c", name)] if takes else []
     for rule, function in printed.functions.items():
-        fields, outputs = _places(printer, function.arguments), _paths(printer, function.returned)
-        lines += [f"static int replay_{rule}(FILE *file, Outcome *outcome) {{",
-                  f"  double count, v[{len(fields) + len(outputs)}];",
-                  "  if (fread(&count, sizeof count, 1, file) != 1) return 0;",
-                  "  for (int i = 0; i < (int)count; i++) {",
-                  "    if (fread(v, sizeof v, 1, file) != 1) return 0;"]  # fmt: skip
+        outputs, inputs, declared = _paths(printer, function.returned), count(), []
         for argument, kind in function.arguments.items():
             if kind in (REAL, WHOLE):
-                lines.append(f"    const {kind} {argument} = ({kind})v[{fields.index((argument, ''))}];")
+                declared.append(f"    const {kind} {argument} = ({kind})v[{next(inputs)}];")
                 continue
-            values_of = [f"(real)v[{fields.index((argument, each))}]" for each in printer.structs[kind]]
-            more = ["ray", "cast", "normal", "uniform", "0"] if kind == percept else []
-            lines.append(f"    const {kind} {argument} = {{{', '.join([*values_of, *more]) or '0'}}};")
+            values = [f"(real)v[{next(inputs)}]" for _ in printer.structs[kind]]
+            values += ["ray", "cast", "normal", "uniform", "0"] if kind == percept else []
+            declared.append(f"    const {kind} {argument} = {{{', '.join(values) or '0'}}};")
+        first = next(inputs)
         given = ", ".join(each if kind in (REAL, WHOLE) else f"&{each}" for each, kind in function.arguments.items())
-        lines.append(f"    const {function.returned} found = {function.name}({given});")
-        lines += [f"    compare(outcome, (real)found{path}, v[{len(fields) + k}]);" for k, path in enumerate(outputs)]
-        lines += ["  }", "  return 1;", "}", ""]
+        lines += [f"static int replay_{rule}(FILE *file, Outcome *outcome) {{",
+                  f"  double count, v[{first + len(outputs)}];",
+                  "  if (fread(&count, sizeof count, 1, file) != 1) return 0;",
+                  "  for (int i = 0; i < (int)count; i++) {",
+                  "    if (fread(v, sizeof v, 1, file) != 1) return 0;",
+                  *declared, f"    const {function.returned} found = {function.name}({given});",
+                  *(f"    compare(outcome, (real)found{path}, v[{k}]);" for k, path in enumerate(outputs, first)),
+                  "  }", "  return 1;", "}", ""]  # fmt: skip
     calls = "\n".join(f'  bad |= report("{rule}", replay_{rule}, file);' for rule in printed.functions)
     return _template("test.c", name, REPLAYS="\n".join(lines), CALLS=calls)
-
-
-def _places(printer: CPrinter, arguments: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return argument and field of each number of a case, in their order."""
-    return [
-        place
-        for argument, kind in arguments.items()
-        for place in (
-            [(argument, "")] if kind in (REAL, WHOLE) else [(argument, each) for each in printer.structs[kind]]
-        )
-    ]
 
 
 def _paths(printer: CPrinter, kind: str) -> list[str]:

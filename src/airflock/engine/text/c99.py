@@ -7,7 +7,7 @@ branches, loops, calls and arithmetic, of which each has one form in C. Types fo
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from airflock.core import PERCEPT_METHODS, law, tree_of, walk_tree
 from airflock.engine.text.generate import DriverSource
@@ -43,11 +43,13 @@ CALLED = {ast.Pow: ("r_pow", {"pow"}), ast.Mod: ("remainder_of", {"fmod", "remai
 DRAWS = ("normal", "uniform")  # methods of a percept that take a whole number
 
 
-class Function:
+class Function(NamedTuple):
     """A function as C: its name, the types of its arguments by name, the type that it returns, and its text."""
 
-    def __init__(self, name: str, arguments: dict[str, str], returned: str, text: str):
-        self.name, self.arguments, self.returned, self.text = name, arguments, returned, text
+    name: str
+    arguments: dict[str, str]
+    returned: str
+    text: str
 
 
 class CPrinter:
@@ -166,8 +168,11 @@ class _Body(ast.NodeVisitor):
         if self.returned is None:
             self.refuse(self.tree, "returns nothing; a rule that is printed returns numbers or a record")
         named = {each: each if each in self.copied else self.written.get(each, each) for each in self.arguments}
-        head = ", ".join(f"{self.parameter(kind)}{named[each]}" for each, kind in self.arguments.items()) or "void"
-        begin = [f"  {kind} {self.c_name(name)} = {self.zero(kind)};" for name, kind in self.hoisted.items()]
+        handed = {each: f"{kind} " if kind in (REAL, WHOLE) else f"const {kind} *"
+                  for each, kind in self.arguments.items()}  # fmt: skip
+        head = ", ".join(f"{kind}{named[each]}" for each, kind in handed.items()) or "void"
+        zero = {REAL: "R(0.0)", WHOLE: "0"}
+        begin = [f"  {kind} {self.c_name(name)} = {zero.get(kind, '{R(0.0)}')};" for name, kind in self.hoisted.items()]
         begin += [f"  {self.arguments[each]} {self.c_name(each)} = *{each};" for each in self.copied]
         # What only another choice reads is still an argument or a variable here.
         unread = [each for each in self.types if each not in self.read]
@@ -189,12 +194,6 @@ class _Body(ast.NodeVisitor):
         return [
             item.id for item in walk_tree(self.tree) if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store)
         ]
-
-    def zero(self, kind: str) -> str:
-        return "R(0.0)" if kind == REAL else "0" if kind == WHOLE else "{R(0.0)}"
-
-    def parameter(self, kind: str) -> str:
-        return f"{kind} " if kind in (REAL, WHOLE) else f"const {kind} *"
 
     def refuse(self, node: ast.AST, text: str) -> NoReturn:
         raise RuleError(f"{self.printer.place(self.name, node)}: {text}")
@@ -243,7 +242,10 @@ class _Body(ast.NodeVisitor):
         return taken + [self.set(name, kind, at) for name, (kind, _), at in zip(names, parts, kept, strict=True)]
 
     def visit_AugAssign(self, node: ast.AugAssign) -> list[str]:
-        return self.visit_Assign(ast.Assign([node.target], ast.BinOp(_read(node.target), node.op, node.value)))
+        if not isinstance(node.target, ast.Name):
+            self.refuse(node.target, f"sets {ast.unparse(node.target)}; set variables one by one")
+        read = ast.copy_location(ast.Name(node.target.id, ast.Load()), node.target)
+        return [self.set(node.target.id, *self.visit(ast.BinOp(read, node.op, node.value)))]
 
     def visit_If(self, node: ast.If) -> list[str]:
         lines = [f"if ({self.truth(node.test)}) {{", *self.block(node.body, self.depth + 1)]
@@ -414,8 +416,7 @@ class _Body(ast.NodeVisitor):
             return name, f"({name}){{{', '.join(given)}}}"
         if name not in own.trees:
             self.refuse(node, f"calls {name}, which has no form in C; of math.h there are {', '.join(sorted(MATHS))}")
-        arguments = own.trees[name].args
-        values = self.in_order(node, [each.arg for each in arguments.args], arguments.defaults)
+        values = self.in_order(node, [each.arg for each in own.trees[name].args.args])
         types = [self.visit(each)[0] for each in values]
         if name in own.functions:  # a whole number may be handed where a number is expected
             known = own.functions[name].arguments.values()
@@ -423,10 +424,9 @@ class _Body(ast.NodeVisitor):
         found = own.called(name, types)
         return found.returned, f"{name}({', '.join(self.passed(each) for each in values)})"
 
-    def in_order(self, node: ast.Call, names: list[str], defaults: Sequence[ast.expr] = ()) -> list[ast.expr]:
-        """Return the values of a call in the order of the names; those by keyword and by default, too."""
-        values = dict(zip(names[len(names) - len(defaults) :], defaults, strict=True))
-        values |= dict(zip(names, node.args, strict=False)) | {str(each.arg): each.value for each in node.keywords}
+    def in_order(self, node: ast.Call, names: list[str]) -> list[ast.expr]:
+        """Return the values of a call in the order of the names; those by keyword, too."""
+        values = dict(zip(names, node.args, strict=False)) | {str(each.arg): each.value for each in node.keywords}
         if len(node.args) > len(names) or set(values) != set(names):
             self.refuse(node, f"{ast.unparse(node)} needs {', '.join(names)}, each once")
         return [values[each] for each in names]
@@ -441,8 +441,3 @@ class _Body(ast.NodeVisitor):
 def fits_float(number: float) -> bool:
     """Return True if a number is zero, or none that becomes zero or infinite in single precision."""
     return number == 0.0 or 1.2e-38 < abs(number) < 3.4e38
-
-
-def _read(target: ast.expr) -> ast.expr:
-    """Return a target of an assignment as it is read."""
-    return ast.copy_location(ast.Name(target.id, ast.Load()), target) if isinstance(target, ast.Name) else target
