@@ -56,6 +56,7 @@ from .scenarios.scaling import starting_set as starting_set
 from .scenarios.scenario import Scenario as Scenario
 from .search.evolution import evolve as evolve, validate as validate
 from .search.hardening import harden as harden
+from .search.league_table import league as league
 from .search.tuning_run import tune as tune
 from .studio.live_page import watch as watch
 from .support.errors import AirflockError as AirflockError

@@ -213,6 +213,21 @@ def _print_tuned(tuning: Any, shown: list[str], as_json: bool = False) -> None:
     terminal.print_result(tuning, as_json)
 
 
+@verb(PANEL, "airflock.league", "quiet json")
+def league(o: SimpleNamespace) -> Any:
+    """Compare laws on robots in worlds: each is tuned by the same flights and judged on the same held-out seeds.
+
+    The folder then holds result.toml, which anybody can compute anew or add laws to, and league.html with table,
+    picture and replays.
+
+    Example: airflock league league.toml --out table --law mine.py
+    """
+    how = {name: getattr(o, name) for name in ("resume", "scheduler", "threads", "trust")}
+    with run_progress(o.quiet or o.json) as watch:
+        result = search.league(o.source, o.out, law=o.law or (), watch=watch, **how)
+    return None if o.quiet and not o.json else result
+
+
 @verb(PANEL, "airflock.certify", f"{SHARED} law precision out plot", without="folder")
 def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
     """Show that an event is rare: exact bounds, seeds fixed in advance, every interim look accounted for.

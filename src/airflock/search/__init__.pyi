@@ -16,6 +16,7 @@ from .hardening import (
     hardened_document as hardened_document,
     hardening_request as hardening_request,
 )
+from .league_table import league as league
 from .limit_excess import limit_report_line as limit_report_line
 from .optimisers import (
     CMAES as CMAES,

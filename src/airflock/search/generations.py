@@ -53,6 +53,10 @@ from airflock.support import StudyError
 FlightScores = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, repeat) → order parameters, None: failed
 
 
+class NothingFliesError(StudyError):
+    """A search has no winner, whatever its folder: all candidates fail, or their fitness is the same."""
+
+
 @dataclass(frozen=True)
 class Evaluator:
     """Evaluator of candidates: a study with its store of flights and its executor.
@@ -219,11 +223,11 @@ def refuse_flat(study: Study, store: FlightStore, generation: int, values: Seque
     if not found:
         number = f"{name} is nan or inf, no finite number, for all of {len(values)} candidates"
         why = next(iter(store.reasons()), number)
-        raise StudyError(f"{study.scenario.name}: every candidate failed; the first one: {why}")
+        raise NothingFliesError(f"{study.scenario.name}: every candidate failed; the first one: {why}")
     if len(found) < FEWEST:
         return
     if max(found) - min(found) <= 1e-12 * max(1.0, abs(max(found))):
-        raise StudyError(
+        raise NothingFliesError(
             f"{study.scenario.name}: nothing to search: {name} is flat, {found[0]:g} for all of {len(found)} candidates"
             f"{zero_fitness_reason(search_scores(store)) if found[0] == 0.0 else ''}"
         )
@@ -460,7 +464,7 @@ def _sound_candidates(study: Study, store: FlightStore, table: pd.DataFrame, fol
     sound = sort_by_fitness(whole, first.name, first.maximise)
     if not len(sound):
         reason = next(iter(store.reasons()), f"{first.name} is nan or inf, no finite number")
-        raise StudyError(f"{folder}: every candidate failed; the first one: {reason}")
+        raise NothingFliesError(f"{folder}: every candidate failed; the first one: {reason}")
     return sound
 
 

@@ -17,7 +17,8 @@ class Parameters(Record):
         source="our choice",
         meaning="set of order parameters, or a file of your own that ends in .py. vasarhelyi, dimock, zapotecatl and "
         "kidger: those of the paper; groups: zapotecatl, with sub-groups told apart; contacts: "
-        "collisions and contacts with walls and obstacles; order: polarisation, milling, speed and shape",
+        "collisions and contacts with walls and obstacles; order: polarisation, milling, speed and shape; swarmlab: "
+        "vasarhelyi, with order, safety, union and connectivity",
     )
     stop: str = choice(
         "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",

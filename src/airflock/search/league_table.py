@@ -1,0 +1,508 @@
+"""League: laws × robots × worlds. Each law is tuned by the same search, and judged on the same held-out seeds.
+
+A cell is one law on one robot in one world: a study in a folder of its own, then flights of its winner on seeds that no
+study flies. All laws of a robot in a world fly the same seeds, so that they are compared in pairs.
+"""
+
+import math
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
+from importlib import resources
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from airflock import __version__
+from airflock.runs import (
+    RESULT_FILE,
+    CandidateBatch,
+    Flight,
+    Interrupted,
+    OnProgress,
+    ProgressTally,
+    ScenarioTask,
+    held_request,
+    make_executor,
+    open_folder,
+    open_run,
+    program_versions,
+    read_request,
+    read_toml_file,
+    run_place,
+    to_toml_values,
+    with_parameters,
+    write_toml_file,
+)
+from airflock.scenarios import Scenario, load
+from airflock.search.evolution import run_study, study_executor
+from airflock.search.generations import NothingFliesError
+from airflock.search.study import SearchSettings, Study, make_study
+from airflock.search.study_result import mean_interval
+from airflock.search.tune_report import STYLE
+from airflock.support import (
+    ErrorCollector,
+    FlightError,
+    RuleError,
+    ScenarioError,
+    StudyError,
+    as_error,
+    atomic,
+    expand_path,
+    holm_correction,
+    is_number,
+    result_group,
+    result_table,
+    suggest,
+    to_identifier,
+)
+
+SHIPPED = "league_1.toml"  # the league that comes with the package
+PAGE, PICTURE, CELLS, REPLAY = "league.html", "league.png", "cells", "replay.html"
+KEYS = ("title", "version", "scenario", "held_out", "set", "robots", "worlds", "laws", "search")
+LAW_KEYS = ("file", "set", "space")
+METRICS = "metrics.kind"
+TUNED_BY, JUDGED_BY = "vasarhelyi", "swarmlab"  # of one fitness; the latter also measures connectivity, which costs time
+HELD_OUT = CandidateBatch("held_out", 0, 0)
+PURPOSE = 5  # of held-out seeds; those of a study are 0 to 4
+LEVEL = 0.05  # of all comparisons of a league together, by Holm
+SHOWN = {  # columns of the tables
+    "fitness": "fitness", "order": "order", "safety": "safety", "union": "union", "connectivity": "connectivity",
+    "phi_vel": "speed, m/s",
+}  # fmt: skip
+
+
+class Cell(NamedTuple):
+    """One law on one robot in one world."""
+
+    law: str
+    robot: str
+    world: str
+
+    def __str__(self) -> str:
+        return f"{self.law} on {self.robot} in {self.world}"
+
+
+@dataclass(frozen=True)
+class League:
+    """A league as its file says it.
+
+    document : title, version, scenario, held_out, set, robots, worlds and search, as plain values
+    laws     : name of each law → its `file`, if it is no law of the package, its tables `set` and `space`; a folder may
+               get further laws
+    source   : file of a computed league whose rows are taken over, "" for none
+    """
+
+    document_: Mapping[str, Any]
+    laws: Mapping[str, Mapping[str, Any]]
+    source: str = ""
+    kind = "league"
+
+    def document(self) -> dict[str, Any]:
+        """Return all that decides the result of a law, as plain values: the request in its folder."""
+        return {"airflock": __version__, **self.document_}
+
+    @property
+    def also(self) -> dict[str, Any]:
+        """The laws, which a folder may hold more of than it began with."""
+        return {"laws": dict(self.laws), **({"source": self.source} if self.source else {})}
+
+    @property
+    def cells(self) -> list[Cell]:
+        """All cells, robot by robot and world by world."""
+        table = self.document_
+        return [Cell(law, robot, world) for robot in table["robots"] for world in table["worlds"] for law in self.laws]
+
+    @property
+    def held_out(self) -> int:
+        """Number of held-out flights of each cell."""
+        return int(self.document_["held_out"])
+
+    def scenario(self, cell: Cell, metrics: str, *, trust: bool) -> Scenario:
+        """Return the scenario of a cell, with its law's own settings last."""
+        table = self.document_
+        own = self.laws[cell.law]
+        settings = {**table.get("set", {}), **table["robots"][cell.robot], **table["worlds"][cell.world]}
+        settings |= {**own.get("set", {}), METRICS: metrics}
+        return load(table["scenario"], settings, own.get("file", cell.law), trust=trust)
+
+    def study(self, cell: Cell, *, trust: bool) -> Study | str:
+        """Return the study by which a cell is tuned, or why its law cannot fly at all."""
+        scenario = self.scenario(cell, TUNED_BY, trust=trust)
+        space = self.laws[cell.law].get("space")
+        tables = {} if space is None else {"space": space}
+        try:
+            return make_study(tables, str(cell), search=self.document_.get("search"), scenario=scenario, trust=trust)
+        except RuleError as error:
+            return str(error).partition("\n")[0]
+
+
+@dataclass(frozen=True)
+class LeagueResult:
+    """A league that has been flown.
+
+    rows        : one for each cell: law, robot, world; either the reason why it does not flock, or parameters, means
+                  of the order parameters with Student's 95 % intervals, and the fitness of each held-out flight
+    comparisons : one for each two laws that flock on one robot in one world: the mean paired difference of fitness, its
+                  interval, and p, corrected by Holm over all of them
+    """
+
+    folder: Path
+    league: League
+    rows: tuple[Mapping[str, Any], ...]
+    comparisons: tuple[Mapping[str, Any], ...]
+
+    def __repr__(self) -> str:
+        return f"<League {self.folder}: {len(self.league.laws)} laws, {len(self.rows)} cells>"
+
+    def __rich__(self) -> Any:
+        """Return a table for each robot in each world, for a terminal."""
+        heads = "law; ranks; >" + "; >".join(SHOWN.values())
+        tables = [result_table(title, heads, table) for title, table in self.tables()]
+        reasons = [f"{Cell(r['law'], r['robot'], r['world'])}: {r['reason']}" for r in self.rows if r["reason"]]
+        return result_group(*tables, *reasons, f"saved {self.folder}: {RESULT_FILE}, {PAGE}, {PICTURE}")
+
+    def document(self) -> dict[str, Any]:
+        """Return the league as plain values, for result.toml and --json."""
+        return {
+            "league": {**to_toml_values(self.league.document_), "laws": to_toml_values(self.league.laws)},
+            "versions": program_versions(),
+            "rows": [dict(row) for row in self.rows],
+            "comparisons": [dict(each) for each in self.comparisons],
+        }
+
+    def ranks(self, row: Mapping[str, Any]) -> tuple[int, int] | None:
+        """Return the best and the worst rank that a law may have in its cell; None where it does not flock."""
+        if row["reason"]:
+            return None
+        here = [each for each in self.comparisons if (each["robot"], each["world"]) == (row["robot"], row["world"])]
+        own = [each for each in here if row["law"] in (each["law"], each["other"])]
+        apart = [each for each in own if each["p"] < LEVEL]
+        better = sum((each["difference"] < 0.0) == (each["law"] == row["law"]) for each in apart)
+        return 1 + better, 1 + better + len(own) - len(apart)
+
+    def tables(self) -> Iterable[tuple[str, list[tuple[str, ...]]]]:
+        """Yield title and lines (law, ranks, order parameters) for each robot in each world, the best law first."""
+        for block in dict.fromkeys((row["robot"], row["world"]) for row in self.rows):
+            rows = [row for row in self.rows if (row["robot"], row["world"]) == block]
+            rows.sort(key=lambda row: -row.get("values", {}).get("fitness", {}).get("mean", -1.0))
+            yield f"{block[0]}, {block[1]}", [self._line(row) for row in rows]
+
+    def _line(self, row: Mapping[str, Any]) -> tuple[str, ...]:
+        span = self.ranks(row)
+        ranks = "does not flock" if span is None else f"{span[0]}" if span[0] == span[1] else f"{span[0]} to {span[1]}"
+        values = (row.get("values", {}).get(name) for name in SHOWN)
+        numbers = (f"{v['mean']:.3f} ({v['low']:.3f} to {v['high']:.3f})" if v else "" for v in values)
+        return (row["law"], ranks, *numbers)
+
+
+def league(
+    source: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    law: Sequence[str] = (),
+    resume: bool = False,
+    scheduler: str | None = None,
+    threads: int | None = None,
+    watch: OnProgress | None = None,
+    trust: bool = False,
+) -> LeagueResult:
+    """Compare laws on robots in worlds: each is tuned by the same flights and judged on the same held-out seeds.
+
+    Parameters
+    ----------
+    source : str or path (FILE), optional
+        The file of a league, or the result.toml of one, whose rows are taken over; by default the league of the
+        package.
+    out : str or path (DIR)
+        Folder of the league: every flight as it lands, result.toml, and a page with table, picture and replays.
+    law : sequence of str (LAW|FILE.py)
+        A further law, by its name or its file, whose numbers are searched about its defaults; repeatable.
+    resume : bool
+        Continue the league in the folder, or add laws to it.
+    scheduler : str, optional
+        Address of a dask scheduler; by default flights fly in this process.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    watch : callable, optional
+        Called with an `airflock.runs.RunProgress` after each flight.
+    trust : bool
+        Whether code that the file names may run; a law that is given by `law` may.
+
+    Returns
+    -------
+    LeagueResult
+        Rows, comparisons and ranks; the same stands in the folder as result.toml.
+
+    Raises
+    ------
+    ScenarioError, StudyError
+        If the file, one of its scenarios or the folder cannot be used.
+    Interrupted
+        At Ctrl-C; what has flown is kept.
+
+    Notes
+    -----
+    Measures of swarms: Soria, Schiano and Floreano 2020. Ranks: paired t-tests, corrected by Holm over the league.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.league("legue.toml", "table")
+    Traceback (most recent call last):
+    airflock.support.errors.StudyError: legue.toml: no such file
+    """
+    folder, errors = run_place(out), ErrorCollector()
+    found = errors.read(read_league, source, law, folder if resume else None, trust=trust)
+    errors.raise_errors()
+    # Errors of cells come before anything flies; those of several cells are one line.
+    known = {Cell(row["law"], row["robot"], row["world"]): row for row in _computed(found)}
+    studies = {cell: errors.read(found.study, cell, trust=trust) for cell in found.cells if cell not in known}
+    errors.raise_errors("" if source is None else str(source))
+    open_folder(folder, found, resume=resume)
+    rows = []
+    for number, cell in enumerate(found.cells, 1):
+        place = folder / CELLS / "_".join(cell)
+        where = f"cell {number} of {len(found.cells)}, {cell}"
+        rows.append(known.get(cell) or fly_cell(found, cell, studies[cell], place, where, scheduler, threads, watch))
+    result = LeagueResult(folder, found, tuple(rows), tuple(compare_laws(rows)))
+    _save_page(result)
+    # last: a folder with a result is complete
+    write_toml_file(folder / RESULT_FILE, result.document(), f"League: {found.document_['title']}.")
+    return result
+
+
+def read_league(
+    source: str | os.PathLike[str] | None, laws: Sequence[str], folder: Path | None, *, trust: bool
+) -> League:
+    """Read a league from a file, from the result of one, or (`source` None) from the folder that is resumed.
+
+    laws : further ones
+    Raises ScenarioError with one line for each error, StudyError for a file or folder that cannot be read.
+    """
+    held = None if folder is None else read_request(folder, League.kind)
+    before = (held or {}).get("also", {})
+    if source is None and folder is not None:
+        held = held_request(folder, League.kind, {})
+        where, table, origin = str(folder), {key: held[key] for key in KEYS if key in held}, before.get("source", "")
+    else:
+        path = Path(str(resources.files(__package__) / SHIPPED)) if source is None else expand_path(source)
+        where, table = str(source or SHIPPED), read_toml_file(path)
+        is_result = isinstance(table.get("league"), dict) and "rows" in table
+        table, origin = (table["league"], str(path.absolute())) if is_result else (table, before.get("source", ""))
+    _check_league(table, where)
+    of_file = {name: dict(entry) for name, entry in table.pop("laws", {}).items()}
+    for entry in of_file.values():
+        if "file" in entry:
+            entry["file"] = str(path.parent.absolute() / expand_path(entry["file"]))
+    added = dict(_added_law(name) for name in laws)
+    known = {**before.get("laws", {}), **of_file}
+    errors = ErrorCollector()
+    for name, entry in added.items():
+        if known.setdefault(name, entry) != entry and entry:
+            errors.add(f"law = {entry['file']!r}: another law of the league is called {name}; rename the file")
+    # A law of the command line is given, so it may run; one that a file names needs consent.
+    for name, entry in known.items():
+        if "file" in entry and name not in added and not trust:
+            errors.add(f"laws.{name}: would run the code in {entry['file']}; if you trust it, add --trust")
+    if not known:
+        errors.add("laws is missing; write a table [laws.NAME] for each law, or give --law")
+    errors.raise_errors(where)
+    return League({"title": "League", "version": 1, **table}, known, origin)
+
+
+def _added_law(name: str) -> tuple[str, dict[str, str]]:
+    """Return name and entry of a law of the command line."""
+    if not name.endswith(".py"):
+        return name, {}
+    path = expand_path(name).absolute()
+    return to_identifier(path.stem), {"file": str(path)}
+
+
+def _check_league(table: Mapping[str, Any], where: str) -> None:
+    """Raise ScenarioError for keys and values of a league's file that cannot be used, all errors together."""
+    hint = f"known: {', '.join(KEYS)}"
+    errors = ErrorCollector(f"{key}: unknown key; {suggest(key, KEYS, hint)}" for key in table if key not in KEYS)
+    if not isinstance(table.get("scenario"), str):
+        errors.add('scenario is missing; write scenario = "NAME", the preset or file that all cells share')
+    flights = table.get("held_out")
+    if not (is_number(flights) and 2 <= flights <= 1e6 and flights == int(flights)):
+        errors.add(f"held_out = {flights!r} is not a whole number of flights in [2, 1e6]")
+    for key in ("set", "search", "robots", "worlds", "laws"):
+        entries = table.get(key, {})
+        if not isinstance(entries, Mapping):
+            errors.add(f"{key} = {entries!r} is not a table")
+            continue
+        if key in ("robots", "worlds") and not entries:
+            errors.add(f"{key} is missing; write a table [{key}.NAME] of keys of the scenario for each")
+        for name, entry in entries.items() if key in ("robots", "worlds", "laws") else ():
+            if not isinstance(entry, Mapping):
+                errors.add(f"{key}.{name} = {entry!r} is not a table")
+                continue
+            if not re.fullmatch(r"[\w-]+", name):
+                errors.add(f"{key}.{name}: a name is made of letters, digits, _ and -; it becomes that of a folder")
+            settings = entry.get("set", {}) if key == "laws" else entry
+            unknown = [word for word in entry if key == "laws" and word not in LAW_KEYS]
+            errors.add(*(f"laws.{name}.{word}: unknown key; known: {', '.join(LAW_KEYS)}" for word in unknown))
+            if not isinstance(settings, Mapping):
+                errors.add(f"laws.{name}.set = {settings!r} is not a table")
+            elif METRICS in settings:
+                errors.add(f"{key}.{name}: {METRICS} is that of the league; leave it out")
+            if not isinstance(entry.get("file", ""), str):
+                errors.add(f"laws.{name}.file = {entry['file']!r} is not the name of a file")
+    if isinstance(table.get("set"), Mapping) and METRICS in table["set"]:
+        errors.add(f"set: {METRICS} is that of the league; leave it out")
+    errors.raise_errors(where)
+
+
+def _computed(found: League) -> list[Mapping[str, Any]]:
+    """Return the rows of a computed league. Raises StudyError for a damaged one, and for other sizes."""
+    if not found.source:
+        return []
+    held = read_toml_file(Path(found.source))
+    with as_error(found.source, StudyError):
+        theirs = {key: value for key, value in held["league"].items() if key != "laws"}
+        if theirs != to_toml_values(found.document_):
+            raise StudyError(f"{found.source}: is the result of another league; give another --out")
+        rows = [row for row in held["rows"] if row["law"] in found.laws]
+        if any(not row["reason"] and len(row["held_out"]) != found.held_out for row in rows):
+            raise StudyError(f"{found.source}: is damaged: a row has not {found.held_out} held-out flights")
+        if version := held["versions"]["airflock"] if held["versions"]["airflock"] != __version__ else "":
+            raise StudyError(f"{found.source}: was computed by Airflock {version}, this is {__version__}; compute it anew")
+    return rows
+
+
+def fly_cell(
+    found: League, cell: Cell, study: Study | str, place: Path, where: str, scheduler: str | None, threads: int | None,
+    watch: OnProgress | None,
+) -> dict[str, Any]:  # fmt: skip
+    """Tune a law in its folder and judge it; return its row, with the reason where it does not flock."""
+    row: dict[str, Any] = {"law": cell.law, "robot": cell.robot, "world": cell.world, "reason": ""}
+    if isinstance(study, str):
+        return row | {"reason": study}
+    # Errors of the folder end the league: they say nothing of the law.
+    open_folder(place, study)
+    stage = watch and (lambda p: watch(replace(p, stage=f"{where}: {p.stage}")))
+    try:
+        tuned = run_study(study, place, study_executor(study, scheduler, threads), stage)
+        if tuned.dead_reason:
+            return row | {"reason": tuned.dead_reason}
+        judged = found.scenario(cell, JUDGED_BY, trust=True)
+        executor = make_executor([ScenarioTask(judged, int(study.search.precision))], scheduler=scheduler, threads=threads)
+        tally = ProgressTally("held-out flights", found.held_out, stage)
+        seeds = [study.seed(PURPOSE, j) for j in range(found.held_out)]
+        flights = [Flight(0, j, tuned.parameters, seed) for j, seed in enumerate(seeds)]
+        with open_run(place, executor) as store:
+            flown = store.fly_missing(executor, HELD_OUT, flights, lambda: tally.note(True))
+            (tuning,) = store.rows("SELECT count(*) FROM flight WHERE stage <> ?", (HELD_OUT.stage,))[0]
+        scores = [flown[0, j] for j in range(found.held_out)]
+        _save_replay(place, with_parameters(judged, tuned.parameters), seeds[0])
+    except Interrupted:
+        raise
+    except (RuleError, FlightError, NothingFliesError) as error:
+        return row | {"reason": str(error).partition("\n")[0]}
+    fitness = [float(each["fitness"]) for each in scores]
+    if not all(map(math.isfinite, fitness)):
+        return row | {"reason": f"fitness is no finite number in {sum(f != f for f in fitness)} held-out flights"}
+    return row | {
+        "tuning_flights": int(tuning),
+        "parameters": dict(tuned.parameters),
+        "values": {name: found for name in scores[0] if (found := _interval([each[name] for each in scores]))},
+        "held_out": fitness,
+    }
+
+
+def _interval(values: Sequence[Any]) -> dict[str, float]:
+    """Return the mean and Student's 95 % interval of an order parameter; empty where it is not a number throughout."""
+    if not all(is_number(value) and math.isfinite(value) for value in values):
+        return {}
+    mean, _, low, high = mean_interval(values)
+    return {"mean": mean, "low": low, "high": high}
+
+
+def compare_laws(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Compare each two laws that flock on one robot in one world, in pairs of held-out flights of one seed.
+
+    Two laws whose difference is the same in all flights are not told apart: it has no spread to judge it by.
+    """
+    flying = [row for row in rows if not row["reason"]]
+    pairs = [(a, b) for a, b in combinations(flying, 2) if (a["robot"], a["world"]) == (b["robot"], b["world"])]
+    gaps = [np.subtract(a["held_out"], b["held_out"]) for a, b in pairs]
+    # Paired by seed: both fly the same start and the same noise, so most of the spread between seeds cancels.
+    raw = [float(stats.ttest_1samp(gap, 0.0).pvalue) if np.ptp(gap) > 1e-12 else math.nan for gap in gaps]
+    corrected = [1.0 if math.isnan(p) else p for p in holm_correction(raw)]
+    return [
+        {"robot": a["robot"], "world": a["world"], "law": a["law"], "other": b["law"], "p": p}
+        | dict(zip(("difference", "low", "high"), np.delete(mean_interval(gap), 1).tolist(), strict=True))
+        for (a, b), gap, p in zip(pairs, gaps, corrected, strict=True)
+    ]
+
+
+def _save_replay(place: Path, scenario: Scenario, seed: int) -> None:
+    """Save the replay of the first held-out flight, once."""
+    from airflock.recordings import simulate
+    from airflock.view import replay
+
+    if not (place / REPLAY).is_file():
+        replay(simulate(scenario, seed)).save(place / REPLAY)
+
+
+def _save_page(result: LeagueResult) -> None:
+    """Write the page with its picture beside it."""
+    table, title = result.league.document_, escape(str(result.league.document_["title"]))
+    search = SearchSettings(**(table.get("search") or {}))
+    _draw(result)
+    body = [
+        f"<h1>{title}</h1>",
+        f"<p>Version {table['version']}, Airflock {__version__}. Each law was tuned by {search.generations:g} generations "
+        f"of {search.population:g} candidates and a final, then flown on {result.league.held_out} seeds that chose "
+        "nothing, the same for all laws. In brackets: 95 % intervals. Ranks are those that paired differences of fitness "
+        f"allow, at {100.0 * LEVEL:g} % for the whole league together (Holm).</p>",
+        f'<img alt="Fitness of each law, with 95 % intervals" src="{PICTURE}">',
+    ]
+    for heading, lines in result.tables():
+        robot, world = heading.split(", ")
+        rows = "".join(f"<tr><td>{_cell_link(result, line[0], robot, world)}</td>"
+                       f"{''.join(f'<td>{escape(text)}</td>' for text in line[1:])}</tr>" for line in lines)  # fmt: skip
+        heads = "".join(f"<th>{escape(text)}</th>" for text in ("law", "ranks", *SHOWN.values()))
+        body.append(f"<h2>{escape(heading)}</h2><table><tr>{heads}</tr>{rows}</table>")
+    reasons = [f"{Cell(row['law'], row['robot'], row['world'])}: {row['reason']}" for row in result.rows if row["reason"]]
+    body.append("".join(f"<p>{escape(reason)}</p>" for reason in reasons))
+    body.append("<p>Compute it anew: <code>airflock league result.toml</code> adds laws with --law; without it, all is "
+                "taken over; from its file, all is flown.</p>")  # fmt: skip
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
+    atomic.write_file(result.folder / PAGE, f"{head}<style>{STYLE}</style><body>{''.join(body)}</body></html>\n")
+
+
+def _cell_link(result: LeagueResult, law: str, robot: str, world: str) -> str:
+    """Return the name of a law as HTML, with a link to its replay if there is one."""
+    file = Path(CELLS, "_".join((law, robot, world)), REPLAY)
+    return f'<a href="{escape(file.as_posix())}">{escape(law)}</a>' if (result.folder / file).is_file() else escape(law)
+
+
+def _draw(result: LeagueResult) -> None:
+    """Draw the fitness of each law with its interval, one panel for each robot in each world."""
+    from matplotlib.figure import Figure
+
+    from airflock.view import save_figure
+
+    blocks = list(dict.fromkeys((row["robot"], row["world"]) for row in result.rows))
+    names = list(result.league.laws)
+    figure = Figure(figsize=(2.0 + 2.2 * len(blocks), 1.2 + 0.3 * len(names)), layout="constrained")
+    for axes, block in zip(figure.subplots(1, len(blocks), sharey=True, squeeze=False)[0], blocks, strict=True):
+        for row in result.rows:
+            if (row["robot"], row["world"]) == block and not row["reason"]:
+                value, place = row["values"]["fitness"], names.index(row["law"])
+                axes.plot([value["low"], value["high"]], [place, place], color="#0072B2")
+                axes.plot(value["mean"], place, "o", color="#0072B2")
+        axes.set_title(", ".join(block), fontsize=9.0)
+        axes.set_xlim(0.0, 1.0)
+        axes.set_xlabel("fitness")
+        axes.set_yticks(range(len(names)), names)
+        axes.set_ylim(len(names) - 0.5, -0.5)
+    save_figure(figure, result.folder / PICTURE)
