@@ -39,7 +39,7 @@ from airflock.runs import (
     with_parameters,
     write_toml_file,
 )
-from airflock.scenarios import Scenario, load
+from airflock.scenarios import Scenario, load, schema
 from airflock.search.evolution import run_study, study_executor
 from airflock.search.generations import NothingFliesError
 from airflock.search.study import SearchSettings, Study, make_study
@@ -49,7 +49,6 @@ from airflock.support import (
     ErrorCollector,
     FlightError,
     RuleError,
-    ScenarioError,
     StudyError,
     as_error,
     atomic,
@@ -67,7 +66,7 @@ PAGE, PICTURE, CELLS, REPLAY = "league.html", "league.png", "cells", "replay.htm
 KEYS = ("title", "version", "scenario", "held_out", "set", "robots", "worlds", "laws", "search")
 LAW_KEYS = ("file", "set", "space")
 METRICS = "metrics.kind"
-TUNED_BY, JUDGED_BY = "vasarhelyi", "swarmlab"  # of one fitness; the latter also measures connectivity, which costs time
+TUNED_BY, JUDGED_BY = "vasarhelyi", "swarmlab"  # of one fitness; the latter measures more, at a cost
 HELD_OUT = CandidateBatch("held_out", 0, 0)
 PURPOSE = 5  # of held-out seeds; those of a study are 0 to 4
 LEVEL = 0.05  # of all comparisons of a league together, by Holm
@@ -92,20 +91,20 @@ class Cell(NamedTuple):
 class League:
     """A league as its file says it.
 
-    document : title, version, scenario, held_out, set, robots, worlds and search, as plain values
-    laws     : name of each law → its `file`, if it is no law of the package, its tables `set` and `space`; a folder may
-               get further laws
-    source   : file of a computed league whose rows are taken over, "" for none
+    table  : title, version, scenario, held_out, set, robots, worlds and search, as plain values
+    laws   : name of each law → its `file`, if it is no law of the package, and its tables `set` and `space`; a folder
+             may get further laws
+    source : file of a computed league whose rows are taken over, "" for none
     """
 
-    document_: Mapping[str, Any]
+    table: Mapping[str, Any]
     laws: Mapping[str, Mapping[str, Any]]
     source: str = ""
     kind = "league"
 
     def document(self) -> dict[str, Any]:
         """Return all that decides the result of a law, as plain values: the request in its folder."""
-        return {"airflock": __version__, **self.document_}
+        return {"airflock": __version__, **self.table}
 
     @property
     def also(self) -> dict[str, Any]:
@@ -115,17 +114,17 @@ class League:
     @property
     def cells(self) -> list[Cell]:
         """All cells, robot by robot and world by world."""
-        table = self.document_
-        return [Cell(law, robot, world) for robot in table["robots"] for world in table["worlds"] for law in self.laws]
+        robots, worlds = self.table["robots"], self.table["worlds"]
+        return [Cell(law, robot, world) for robot in robots for world in worlds for law in self.laws]
 
     @property
     def held_out(self) -> int:
         """Number of held-out flights of each cell."""
-        return int(self.document_["held_out"])
+        return int(self.table["held_out"])
 
     def scenario(self, cell: Cell, metrics: str, *, trust: bool) -> Scenario:
         """Return the scenario of a cell, with its law's own settings last."""
-        table = self.document_
+        table = self.table
         own = self.laws[cell.law]
         settings = {**table.get("set", {}), **table["robots"][cell.robot], **table["worlds"][cell.world]}
         settings |= {**own.get("set", {}), METRICS: metrics}
@@ -137,7 +136,7 @@ class League:
         space = self.laws[cell.law].get("space")
         tables = {} if space is None else {"space": space}
         try:
-            return make_study(tables, str(cell), search=self.document_.get("search"), scenario=scenario, trust=trust)
+            return make_study(tables, cell.law, search=self.table.get("search"), scenario=scenario, trust=trust)
         except RuleError as error:
             return str(error).partition("\n")[0]
 
@@ -162,15 +161,15 @@ class LeagueResult:
 
     def __rich__(self) -> Any:
         """Return a table for each robot in each world, for a terminal."""
-        heads = "law; ranks; >" + "; >".join(SHOWN.values())
-        tables = [result_table(title, heads, table) for title, table in self.tables()]
-        reasons = [f"{Cell(r['law'], r['robot'], r['world'])}: {r['reason']}" for r in self.rows if r["reason"]]
+        heads = "|law; |ranks; |>fitness; >" + "; >".join([*SHOWN.values()][1:])
+        tables = [result_table(title, heads, rows, min_width=6) for title, rows in self.tables(("fitness",))]
+        reasons = [f"{_name(row)}: {row['reason']}" for row in self.rows if row["reason"]]
         return result_group(*tables, *reasons, f"saved {self.folder}: {RESULT_FILE}, {PAGE}, {PICTURE}")
 
     def document(self) -> dict[str, Any]:
         """Return the league as plain values, for result.toml and --json."""
         return {
-            "league": {**to_toml_values(self.league.document_), "laws": to_toml_values(self.league.laws)},
+            "league": {**to_toml_values(self.league.table), "laws": to_toml_values(self.league.laws)},
             "versions": program_versions(),
             "rows": [dict(row) for row in self.rows],
             "comparisons": [dict(each) for each in self.comparisons],
@@ -186,19 +185,24 @@ class LeagueResult:
         better = sum((each["difference"] < 0.0) == (each["law"] == row["law"]) for each in apart)
         return 1 + better, 1 + better + len(own) - len(apart)
 
-    def tables(self) -> Iterable[tuple[str, list[tuple[str, ...]]]]:
-        """Yield title and lines (law, ranks, order parameters) for each robot in each world, the best law first."""
+    def tables(self, with_interval: Iterable[str] = SHOWN) -> Iterable[tuple[str, list[tuple[str, ...]]]]:
+        """Yield title and lines (law, ranks, order parameters) for each robot in each world, the best law first.
+
+        with_interval : order parameters that are shown with their intervals
+        """
         for block in dict.fromkeys((row["robot"], row["world"]) for row in self.rows):
             rows = [row for row in self.rows if (row["robot"], row["world"]) == block]
             rows.sort(key=lambda row: -row.get("values", {}).get("fitness", {}).get("mean", -1.0))
-            yield f"{block[0]}, {block[1]}", [self._line(row) for row in rows]
+            yield f"{block[0]}, {block[1]}", [self._line(row, with_interval) for row in rows]
 
-    def _line(self, row: Mapping[str, Any]) -> tuple[str, ...]:
+    def _line(self, row: Mapping[str, Any], with_interval: Iterable[str]) -> tuple[str, ...]:
         span = self.ranks(row)
-        ranks = "does not flock" if span is None else f"{span[0]}" if span[0] == span[1] else f"{span[0]} to {span[1]}"
-        values = (row.get("values", {}).get(name) for name in SHOWN)
-        numbers = (f"{v['mean']:.3f} ({v['low']:.3f} to {v['high']:.3f})" if v else "" for v in values)
-        return (row["law"], ranks, *numbers)
+        ranks = "none" if span is None else f"{span[0]}" if span[0] == span[1] else f"{span[0]} to {span[1]}"
+        values = {name: row.get("values", {}).get(name) for name in SHOWN}
+        numbers = (f"{value['mean']:.3f}" if value else "" for value in values.values())
+        # Student's interval is symmetric about the mean.
+        spreads = (f" ± {v['high'] - v['mean']:.3f}" if v and k in with_interval else "" for k, v in values.items())
+        return (row["law"], ranks, *map("".join, zip(numbers, spreads, strict=True)))
 
 
 def league(
@@ -261,19 +265,20 @@ def league(
     found = errors.read(read_league, source, law, folder if resume else None, trust=trust)
     errors.raise_errors()
     # Errors of cells come before anything flies; those of several cells are one line.
-    known = {Cell(row["law"], row["robot"], row["world"]): row for row in _computed(found)}
-    studies = {cell: errors.read(found.study, cell, trust=trust) for cell in found.cells if cell not in known}
+    known = {_name(row): row for row in _computed(found)}
+    studies = {cell: errors.read(found.study, cell, trust=trust) for cell in found.cells if str(cell) not in known}
     errors.raise_errors("" if source is None else str(source))
     open_folder(folder, found, resume=resume)
     rows = []
     for number, cell in enumerate(found.cells, 1):
-        place = folder / CELLS / "_".join(cell)
+        place = _folder(folder / CELLS, cell._asdict())
         where = f"cell {number} of {len(found.cells)}, {cell}"
-        rows.append(known.get(cell) or fly_cell(found, cell, studies[cell], place, where, scheduler, threads, watch))
+        row = known.get(str(cell))
+        rows.append(row or fly_cell(found, cell, studies[cell], place, where, scheduler, threads, watch))
     result = LeagueResult(folder, found, tuple(rows), tuple(compare_laws(rows)))
     _save_page(result)
     # last: a folder with a result is complete
-    write_toml_file(folder / RESULT_FILE, result.document(), f"League: {found.document_['title']}.")
+    write_toml_file(folder / RESULT_FILE, result.document(), f"League: {found.table['title']}.")
     return result
 
 
@@ -333,7 +338,8 @@ def _check_league(table: Mapping[str, Any], where: str) -> None:
     flights = table.get("held_out")
     if not (is_number(flights) and 2 <= flights <= 1e6 and flights == int(flights)):
         errors.add(f"held_out = {flights!r} is not a whole number of flights in [2, 1e6]")
-    for key in ("set", "search", "robots", "worlds", "laws"):
+    schema.read_section("search", table.get("search", {}), SearchSettings, errors)
+    for key in ("set", "robots", "worlds", "laws"):
         entries = table.get(key, {})
         if not isinstance(entries, Mapping):
             errors.add(f"{key} = {entries!r} is not a table")
@@ -360,6 +366,16 @@ def _check_league(table: Mapping[str, Any], where: str) -> None:
     errors.raise_errors(where)
 
 
+def _name(row: Mapping[str, Any]) -> str:
+    """Return the name of the cell of a row."""
+    return str(Cell(row["law"], row["robot"], row["world"]))
+
+
+def _folder(cells: Path, row: Mapping[str, Any]) -> Path:
+    """Return the folder of a cell among those of all cells."""
+    return cells / f"{row['law']}_{row['robot']}_{row['world']}"
+
+
 def _computed(found: League) -> list[Mapping[str, Any]]:
     """Return the rows of a computed league. Raises StudyError for a damaged one, and for other sizes."""
     if not found.source:
@@ -367,13 +383,15 @@ def _computed(found: League) -> list[Mapping[str, Any]]:
     held = read_toml_file(Path(found.source))
     with as_error(found.source, StudyError):
         theirs = {key: value for key, value in held["league"].items() if key != "laws"}
-        if theirs != to_toml_values(found.document_):
+        if theirs != to_toml_values(found.table):
             raise StudyError(f"{found.source}: is the result of another league; give another --out")
         rows = [row for row in held["rows"] if row["law"] in found.laws]
         if any(not row["reason"] and len(row["held_out"]) != found.held_out for row in rows):
             raise StudyError(f"{found.source}: is damaged: a row has not {found.held_out} held-out flights")
         if version := held["versions"]["airflock"] if held["versions"]["airflock"] != __version__ else "":
-            raise StudyError(f"{found.source}: was computed by Airflock {version}, this is {__version__}; compute it anew")
+            raise StudyError(
+                f"{found.source}: was computed by Airflock {version}, this is {__version__}; compute it anew"
+            )
     return rows
 
 
@@ -382,9 +400,10 @@ def fly_cell(
     watch: OnProgress | None,
 ) -> dict[str, Any]:  # fmt: skip
     """Tune a law in its folder and judge it; return its row, with the reason where it does not flock."""
-    row: dict[str, Any] = {"law": cell.law, "robot": cell.robot, "world": cell.world, "reason": ""}
+    row: dict[str, Any] = {**cell._asdict(), "reason": ""}
     if isinstance(study, str):
         return row | {"reason": study}
+    row["notes"] = [*study.scenario.notes, *study.notes]
     # Errors of the folder end the league: they say nothing of the law.
     open_folder(place, study)
     stage = watch and (lambda p: watch(replace(p, stage=f"{where}: {p.stage}")))
@@ -393,7 +412,9 @@ def fly_cell(
         if tuned.dead_reason:
             return row | {"reason": tuned.dead_reason}
         judged = found.scenario(cell, JUDGED_BY, trust=True)
-        executor = make_executor([ScenarioTask(judged, int(study.search.precision))], scheduler=scheduler, threads=threads)
+        executor = make_executor(
+            [ScenarioTask(judged, int(study.search.precision))], scheduler=scheduler, threads=threads
+        )
         tally = ProgressTally("held-out flights", found.held_out, stage)
         seeds = [study.seed(PURPOSE, j) for j in range(found.held_out)]
         flights = [Flight(0, j, tuned.parameters, seed) for j, seed in enumerate(seeds)]
@@ -454,35 +475,31 @@ def _save_replay(place: Path, scenario: Scenario, seed: int) -> None:
 
 def _save_page(result: LeagueResult) -> None:
     """Write the page with its picture beside it."""
-    table, title = result.league.document_, escape(str(result.league.document_["title"]))
-    search = SearchSettings(**(table.get("search") or {}))
+    table, title = result.league.table, escape(str(result.league.table["title"]))
+    search = SearchSettings(**table.get("search", {}))
     _draw(result)
     body = [
-        f"<h1>{title}</h1>",
-        f"<p>Version {table['version']}, Airflock {__version__}. Each law was tuned by {search.generations:g} generations "
-        f"of {search.population:g} candidates and a final, then flown on {result.league.held_out} seeds that chose "
-        "nothing, the same for all laws. In brackets: 95 % intervals. Ranks are those that paired differences of fitness "
-        f"allow, at {100.0 * LEVEL:g} % for the whole league together (Holm).</p>",
+        f"<h1>{title}</h1><p>Version {table['version']}, Airflock {__version__}. Each law was tuned by "
+        f"{search.generations:g} generations of {search.population:g} candidates and a final, then flown on "
+        f"{result.league.held_out} seeds that chose nothing, the same for all laws. ±: 95 % interval of the mean. "
+        "Ranks are those that paired differences of fitness allow, at "
+        f"{100.0 * LEVEL:g} % for the whole league (Holm).</p>"
         f'<img alt="Fitness of each law, with 95 % intervals" src="{PICTURE}">',
     ]
+    heads = "".join(f"<th>{escape(text)}</th>" for text in ("law", "ranks", *SHOWN.values()))
     for heading, lines in result.tables():
-        robot, world = heading.split(", ")
-        rows = "".join(f"<tr><td>{_cell_link(result, line[0], robot, world)}</td>"
-                       f"{''.join(f'<td>{escape(text)}</td>' for text in line[1:])}</tr>" for line in lines)  # fmt: skip
-        heads = "".join(f"<th>{escape(text)}</th>" for text in ("law", "ranks", *SHOWN.values()))
-        body.append(f"<h2>{escape(heading)}</h2><table><tr>{heads}</tr>{rows}</table>")
-    reasons = [f"{Cell(row['law'], row['robot'], row['world'])}: {row['reason']}" for row in result.rows if row["reason"]]
-    body.append("".join(f"<p>{escape(reason)}</p>" for reason in reasons))
-    body.append("<p>Compute it anew: <code>airflock league result.toml</code> adds laws with --law; without it, all is "
-                "taken over; from its file, all is flown.</p>")  # fmt: skip
+        rows = ("".join(f"<td>{escape(text)}</td>" for text in line) for line in lines)
+        rows_html = "".join(f"<tr>{row}</tr>" for row in rows)
+        body.append(f"<h2>{escape(heading)}</h2><table><tr>{heads}</tr>{rows_html}</table>")
+    body.append("<h2>Cells</h2>")
+    for row in result.rows:
+        file = _folder(Path(CELLS), row) / REPLAY
+        link = f': <a href="{escape(file.as_posix())}">watch</a>' if (result.folder / file).is_file() else ""
+        remarks = "".join(f"<li>{escape(text)}</li>" for text in (row["reason"], *row.get("notes", ())) if text)
+        body.append(f"<p>{escape(_name(row))}{link}</p><ul>{remarks}</ul>")
+    body.append("<p>A law of your own: <code>airflock league result.toml --out DIR --law mine.py</code></p>")
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
     atomic.write_file(result.folder / PAGE, f"{head}<style>{STYLE}</style><body>{''.join(body)}</body></html>\n")
-
-
-def _cell_link(result: LeagueResult, law: str, robot: str, world: str) -> str:
-    """Return the name of a law as HTML, with a link to its replay if there is one."""
-    file = Path(CELLS, "_".join((law, robot, world)), REPLAY)
-    return f'<a href="{escape(file.as_posix())}">{escape(law)}</a>' if (result.folder / file).is_file() else escape(law)
 
 
 def _draw(result: LeagueResult) -> None:
