@@ -21,6 +21,7 @@ from flocks import measured, scenario
 from processes import called
 
 MERIT = {"vasarhelyi_2018": 0.8, "viragh_2014": 0.5, "formation": 0.5, "couzin_2002": 0.0, "mine": 0.3}
+COMMON = {"metrics.v_flock": 4.0, "metrics.r_cluster": 80.0, "start.separation": 8.0}
 SEARCH = {"population": 40, "generations": 1, "pool": 0, "top": 1, "final_seeds": 2}
 OWN = """
 from dataclasses import dataclass
@@ -40,7 +41,7 @@ def decide(own, p):
 def made(folder, name="league.toml", laws=("vasarhelyi_2018", "viragh_2014", "formation"), **changes):
     """Write the file of a small league; return its path."""
     table = {
-        "scenario": "vasarhelyi_2018/4ms", "held_out": 8, "set": {"agents": 4, "duration": 1.0, "dt": 0.1},
+        "scenario": "vasarhelyi_2018/4ms", "held_out": 8, "set": COMMON | {"agents": 4, "duration": 1.0, "dt": 0.1},
         "robots": {"slow": {"body.tau": 1.5}}, "worlds": {"square": {"world.side": 200.0}},
         "laws": laws if isinstance(laws, dict) else {law: {} for law in laws}, "search": SEARCH, **changes,
     }  # fmt: skip
@@ -182,7 +183,8 @@ WRONG = [
     ({"robots": None}, "robots is missing; write a table [robots.NAME]"),
     ({"robots": {"a/b": {}}}, "robots.a/b: a name is made of letters"),
     ({"robots": {"slow": {"radio.dealy": 1.0}}}, "radio.dealy: unknown key; did you mean radio.delay?"),
-    ({"set": {"metrics.kind": "groups"}}, "set: metrics.kind is that of the league"),
+    ({"set": COMMON | {"metrics.kind": "groups"}}, "set.metrics.kind is that of the league"),
+    ({"set": {k: v for k, v in COMMON.items() if k != "start.separation"}}, 'set."start.separation" is missing'),
     ({"laws": {"viragh": {}}}, "unknown model; did you mean viragh_2014?"),
     ({"laws": {"viragh_2014": {"sapce": {}}}}, "laws.viragh_2014.sapce: unknown key; known: file, set, space"),
     ({"laws": {"viragh_2014": {"space": {"model": {"r0": {"low": 1.0}}}}}}, "space.model.r0 is not a number"),
@@ -197,6 +199,19 @@ def test_a_wrong_league_is_refused_with_one_line_before_anything_is_written(tmp_
     done = called("league", path, "--out", tmp_path / "a")
     assert done.returncode == 2 and line in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
     assert not (tmp_path / "a").exists() and not flown
+
+
+def test_every_law_flies_at_the_speed_that_fitness_asks_for(tmp_path):
+    """Also one whose default is another; a law whose speed is no number of its own is refused."""
+    (tmp_path / "mine.py").write_text(OWN + "\ndef preferred_speed(p):\n    return 3.0 + p.turn\n")
+    keys = {"agents": 4, "duration": 1.0, "metrics.v_flock": 7.0}
+    path = made(tmp_path, set=COMMON | keys, laws=("vasarhelyi_2018", "viragh_2014", "couzin_2002"))
+    found = read_league(path, [str(tmp_path / "mine.py")], None, trust=False)
+    for cell in found.cells[:3]:
+        flown = found.scenario(cell, JUDGED_BY, trust=False)
+        assert (flown.model.speed(flown.parameters) or 7.0) == flown.metrics.v_flock == 7.0
+    with pytest.raises(AirflockError, match=r"mine: flies at 3.1 m/s, but metrics.v_flock = 7 m/s; set its speed"):
+        found.scenario(found.cells[3], JUDGED_BY, trust=False)
 
 
 def test_the_league_of_the_package_is_as_large_as_it_says():

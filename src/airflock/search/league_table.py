@@ -27,6 +27,7 @@ from airflock.runs import (
     OnProgress,
     ProgressTally,
     ScenarioTask,
+    declared_numbers,
     held_request,
     make_executor,
     open_folder,
@@ -39,7 +40,7 @@ from airflock.runs import (
     with_parameters,
     write_toml_file,
 )
-from airflock.scenarios import Scenario, load, schema
+from airflock.scenarios import Scenario, load, scenario_variant, schema
 from airflock.search.evolution import run_study, study_executor
 from airflock.search.generations import NothingFliesError
 from airflock.search.study import SearchSettings, Study, make_study
@@ -49,6 +50,7 @@ from airflock.support import (
     ErrorCollector,
     FlightError,
     RuleError,
+    ScenarioError,
     StudyError,
     as_error,
     atomic,
@@ -66,6 +68,7 @@ PAGE, PICTURE, CELLS, REPLAY = "league.html", "league.png", "cells", "replay.htm
 KEYS = ("title", "version", "scenario", "held_out", "set", "robots", "worlds", "laws", "search")
 LAW_KEYS = ("file", "set", "space")
 METRICS = "metrics.kind"
+COMMON = ("metrics.v_flock", "metrics.r_cluster", "start.separation")  # keys whose defaults are those of a law
 TUNED_BY, JUDGED_BY = "vasarhelyi", "swarmlab"  # of one fitness; the latter measures more, at a cost
 HELD_OUT = CandidateBatch("held_out", 0, 0)
 PURPOSE = 5  # of held-out seeds; those of a study are 0 to 4
@@ -128,7 +131,8 @@ class League:
         own = self.laws[cell.law]
         settings = {**table.get("set", {}), **table["robots"][cell.robot], **table["worlds"][cell.world]}
         settings |= {**own.get("set", {}), METRICS: metrics}
-        return load(table["scenario"], settings, own.get("file", cell.law), trust=trust)
+        found = load(table["scenario"], settings, own.get("file", cell.law), trust=trust)
+        return _at_speed(found, cell.law)
 
     def study(self, cell: Cell, *, trust: bool) -> Study | str:
         """Return the study by which a cell is tuned, or why its law cannot fly at all."""
@@ -139,6 +143,26 @@ class League:
             return make_study(tables, cell.law, search=self.table.get("search"), scenario=scenario, trust=trust)
         except RuleError as error:
             return str(error).partition("\n")[0]
+
+
+def _at_speed(scenario: Scenario, law: str) -> Scenario:
+    """Return the scenario with the law at the speed that fitness asks for (metrics.v_flock).
+
+    Raises ScenarioError where no number of the law is its preferred speed.
+    """
+    # A search leaves the speed alone, so a law with a default of its own would lose without a word.
+    own, speed = scenario.model.speed(scenario.parameters), scenario.metrics.v_flock
+    if not own or speed is None or own == speed:
+        return scenario
+    numbers = (
+        key for key, (_, value) in declared_numbers(scenario).items() if key.startswith("model.") and value == own
+    )
+    for key in numbers:
+        found = scenario_variant(scenario, {key: speed})
+        if found.model.speed(found.parameters) == speed:
+            return found
+    advice = f"set its speed under [laws.{law}.set]"
+    raise ScenarioError([f"{law}: flies at {own:g} m/s, but metrics.v_flock = {speed:g} m/s; {advice}"])
 
 
 @dataclass(frozen=True)
@@ -361,8 +385,12 @@ def _check_league(table: Mapping[str, Any], where: str) -> None:
                 errors.add(f"{key}.{name}: {METRICS} is that of the league; leave it out")
             if not isinstance(entry.get("file", ""), str):
                 errors.add(f"laws.{name}.file = {entry['file']!r} is not the name of a file")
-    if isinstance(table.get("set"), Mapping) and METRICS in table["set"]:
-        errors.add(f"set: {METRICS} is that of the league; leave it out")
+    common = table.get("set", {})
+    if isinstance(common, Mapping):
+        errors.add(*(f"set.{METRICS} is that of the league; leave it out" for _ in {METRICS} & set(common)))
+        missing = [key for key in COMMON if key not in common]
+        why = "by default it differs from law to law, so that they would not be compared alike; give a number"
+        errors.add(*(f'set."{key}" is missing: {why}' for key in missing))
     errors.raise_errors(where)
 
 
