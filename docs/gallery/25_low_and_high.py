@@ -46,7 +46,7 @@ def measured(places, velocities):
     }
     told = {"v_flock": 5.0, "max_e": 70.0, "k": 70.0, "centre_x": 0.0, "centre_y": 0.0}  # tracks do not say these
     world |= {f"metrics.{key}": value for key, value in (lengths | told).items()}
-    sets = ("kidger", "vasarhelyi", "groups", "order", "contacts")
+    sets = ("kidger", "vasarhelyi", "groups", "order", "contacts", "swarmlab")
     found = [airflock.score(recording, settings={"metrics.kind": name, **world}).iloc[0] for name in sets]
     return {name: row[name] for row in found for name in row.index}
 
@@ -81,6 +81,7 @@ PAIRS = [
         (loose, 5.0 * alike),
         (loose + 35.0, 5.0 * alike),
     ),
+    (("order", "union", "connectivity", "safety"), (halves, 5.0 * anyhow), (loose * 0.15, 5.0 * alike)),
     (("phi_lap", "phi_lap_abs"), (beside, north), (beside, east)),
     (("milling",), (round_, 5.0 * alike), (round_, 5.0 * along)),
     (("elongation",), (round_, 5.0 * alike), (round_ * (1.5, 0.25), 5.0 * alike)),
