@@ -359,7 +359,7 @@ def _check_league(table: Mapping[str, Any], where: str) -> None:
     errors = ErrorCollector(f"{key}: unknown key; {suggest(key, KEYS, hint)}" for key in table if key not in KEYS)
     if not isinstance(table.get("scenario"), str):
         errors.add('scenario is missing; write scenario = "NAME", the preset or file that all cells share')
-    flights = table.get("held_out")
+    flights: Any = table.get("held_out")
     if not (is_number(flights) and 2 <= flights <= 1e6 and flights == int(flights)):
         errors.add(f"held_out = {flights!r} is not a whole number of flights in [2, 1e6]")
     schema.read_section("search", table.get("search", {}), SearchSettings, errors)
@@ -456,12 +456,15 @@ def fly_cell(
     except (RuleError, FlightError, NothingFliesError) as error:
         return row | {"reason": str(error).partition("\n")[0]}
     fitness = [float(each["fitness"]) for each in scores]
+    intervals = {name: _interval([each[name] for each in scores]) for name in scores[0]}
     if not all(map(math.isfinite, fitness)):
-        return row | {"reason": f"fitness is no finite number in {sum(f != f for f in fitness)} held-out flights"}
+        return row | {
+            "reason": f"fitness is no finite number in {sum(not math.isfinite(f) for f in fitness)} held-out flights"
+        }
     return row | {
         "tuning_flights": int(tuning),
         "parameters": dict(tuned.parameters),
-        "values": {name: found for name in scores[0] if (found := _interval([each[name] for each in scores]))},
+        "values": {name: values for name, values in intervals.items() if values},
         "held_out": fitness,
     }
 
