@@ -111,6 +111,11 @@ def test_a_line_of_agents_has_the_connectivity_of_a_path_and_all_linked_have_one
             assert found["order"] == pytest.approx(0.0 if reach < 10.0 else 1.0, abs=1e-6)
 
 
+def test_measures_of_swarms_are_refused_where_positions_have_images():
+    with pytest.raises(AirflockError, match="not defined with world.edges = 'periodic'; give bounce or open"):
+        airflock.load("vicsek_1995/ordered", {"metrics.kind": "swarmlab"})
+
+
 def test_laws_are_ranked_where_they_can_be_told_apart(tmp_path, flown):
     result = airflock.league(made(tmp_path), tmp_path / "a", threads=2)
     ranks = {row["law"]: result.ranks(row) for row in result.rows}
