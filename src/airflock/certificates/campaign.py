@@ -151,7 +151,7 @@ def campaign_from_request(
     bits = 64 if device == "python" else precision
     campaign = Campaign(scenario, limits, confidence, bits, flights, uncertain, device)
     if uncertain and not campaign.number_intervals:
-        errors.note(f"{scenario.name}: no number has an interval; airflock identify --uncertain writes them")
+        errors.add(f"{scenario.name}: no number has an interval; airflock identify --uncertain writes them")
     errors.raise_errors()
     return campaign
 
@@ -185,7 +185,7 @@ def check_flight_options(precision: int, device: str) -> None:
     errors = ErrorCollector()
     errors.read(check_precision, precision)
     if device not in ("cpu", "python"):
-        errors.note(f"device = {device!r}: a certificate flies on cpu or python")
+        errors.add(f"device = {device!r}: a certificate flies on cpu or python")
     errors.raise_errors()
 
 

@@ -585,11 +585,11 @@ def check_event(event: str, limit: float | None) -> None:
     """Refuse an event that is unknown, and a limit that it does not have."""
     errors = ErrorCollector()
     if event not in EVENTS:
-        errors.note(f"event = {event!r}: {suggest(event, EVENTS, 'known: ' + ', '.join(EVENTS))}")
+        errors.add(f"event = {event!r}: {suggest(event, EVENTS, 'known: ' + ', '.join(EVENTS))}")
     if limit is not None and not (is_number(limit) and 0.0 < limit <= 1000.0):
-        errors.note(f"limit = {limit!r} m lies outside (0, 1000] m; 3.0 is usual")
+        errors.add(f"limit = {limit!r} m lies outside (0, 1000] m; 3.0 is usual")
     if limit is not None and event == "world":
-        errors.note("limit: is that of a pair; metrics.r_body says how near the world an agent touches it")
+        errors.add("limit: is that of a pair; metrics.r_body says how near the world an agent touches it")
     errors.raise_errors()
 
 
@@ -601,11 +601,11 @@ def _check_arguments(
     errors.read(check_event, event, limit)
     usable = not isinstance(leads, str) and isinstance(leads, Sequence) and len(leads)
     if not usable or not all(is_number(lead) and 0.0 < lead <= 1e6 for lead in leads):
-        errors.note(f"leads = {leads!r} is no list of times within (0, 1e6] s, such as [8.0, 4.0, 2.0]")
+        errors.add(f"leads = {leads!r} is no list of times within (0, 1e6] s, such as [8.0, 4.0, 2.0]")
     if not (is_number(futures) and int(futures) == futures and 10 <= futures <= 1_000_000):
-        errors.note(f"futures = {futures!r} is not a whole number within [10, 1,000,000]; {FUTURES} are usual")
+        errors.add(f"futures = {futures!r} is not a whole number within [10, 1,000,000]; {FUTURES} are usual")
     if budget is not None and not (is_number(budget) and budget > 0.0):
-        errors.note(f"budget = {budget!r} is no time above 0 s")
+        errors.add(f"budget = {budget!r} is no time above 0 s")
     errors.raise_errors()
 
 

@@ -51,7 +51,7 @@ class CampaignFlyer:
             self.watch(RunProgress(stage, *progress))
 
 
-COUNT_BATCH = CandidateBatch("count", 0, 0)
+COUNT_BATCH: CandidateBatch = CandidateBatch("count", 0, 0)
 CHUNK = 2.0  # s of flights that are handed out together
 FIRST = 16  # flights before the first guess of how many there will be time for
 MARGIN = 1.5  # a limit is given up early only if it needs so many times the flights that there is time for

@@ -354,15 +354,15 @@ def attack(
     errors.add(*(["kinds: names none; " + KINDS + " are usual"] if not names else []))
     errors.add(*(f"kinds: {name}: given {names.count(name)} times" for name in names if names.count(name) > 1))
     if not 0.05 <= probability <= 0.95:
-        errors.note(f"probability = {probability:g} lies outside [0.05, 0.95]; {PROBABILITY} is usual")
+        errors.add(f"probability = {probability:g} lies outside [0.05, 0.95]; {PROBABILITY} is usual")
     if not budget > 0.0:
-        errors.note(f"budget = {budget:g} s is no time above 0 s")
+        errors.add(f"budget = {budget:g} s is no time above 0 s")
     errors.raise_errors()
     given = scenario_variant(scenario, settings, law, trust=trust)
     flown = measured_by_contacts(given, limit)
     chosen = errors.collect_each(lambda kind: disturbance(kind, flown), kinds)
     if event == "pair" and flown.agents < 2:
-        errors.note(f"{given.name}: one agent meets nobody; event = 'world' attacks what it touches")
+        errors.add(f"{given.name}: one agent meets nobody; event = 'world' attacks what it touches")
     errors.raise_errors()
     target = _Target(flown, event, probability, threads)
     target.fly_bases()

@@ -56,9 +56,9 @@ def fleet(o: SimpleNamespace, errors: ErrorCollector) -> None:
     members = errors.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
     broken = errors.read(_broken, o.faults, value_or_default(members, ALL_SYSTEM_IDS), live)
     if o.card is not None and o.mode == fleets.flying.LOCKSTEP_MODE:
-        errors.note(f"--card {o.card}: in lock-step it flies too fast to watch; add --mode tasks or processes")
+        errors.add(f"--card {o.card}: in lock-step it flies too fast to watch; add --mode tasks or processes")
     if o.beside not in (None, "simulator"):
-        errors.note(f"--against {o.beside}: only simulator is known")
+        errors.add(f"--against {o.beside}: only simulator is known")
     errors.read(_check_one_card, o.card, loaded, numbers)
     errors.raise_errors()
     terminal.print_notes(loaded.notes)
@@ -222,7 +222,7 @@ def prepare(
     where, systems = errors.read(options.parse_position, "--site", site), errors.read(_members, members)
     errors.read(options.check_writable, (out, (".json",)))
     files = out, out.with_suffix(".key"), out.with_suffix(".operator")
-    errors.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
+    errors.add(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
     loaded = options.collect_scenario(errors, scenario, errors.read(options.parse_settings, settings), trust=trust)
     safety = _limits(limit, loaded, errors)
     private, public = drones.new_operator_keys()
@@ -280,7 +280,7 @@ def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> d
     known = [name for name, _, _ in core.declarations(drones.SafetyLimits)]
     safety = value_or_default(errors.read(options.parse_settings, pairs, option="--limit"), {})
     wrong = [name for name in safety if name not in known]
-    errors.note(*(f"--limit {name}: is not a limit; {suggest(name, known, ', '.join(known))}" for name in wrong))
+    errors.add(*(f"--limit {name}: is not a limit; {suggest(name, known, ', '.join(known))}" for name in wrong))
     safety = {name: value for name, value in safety.items() if name in known}
     changed = errors.read(lambda flown: replace(fleets.default_safety(flown), **safety), scenario)
     return {} if changed is INVALID else safety
@@ -367,9 +367,9 @@ def order(
     errors = ErrorCollector()
     what = drones.orders.OrderKind.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
     if what is None or do == "confirm_kill":
-        errors.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
+        errors.add(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
     if (do == "goto") != (point is not None):
-        errors.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
+        errors.add("--point LAT,LON,ALT belongs to goto, and goto needs it")
     where = errors.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
     card = errors.read(drones.read_card, card_file)
     errors.read(_check_target, card, target)

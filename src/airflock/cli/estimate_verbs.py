@@ -119,7 +119,7 @@ def identify(o: SimpleNamespace, errors: ErrorCollector) -> None:
     ground = errors.read(_span, o.standing)
     packets = None if o.heard is None else errors.read(estimate.read_heard, o.heard)
     if o.conservative is not None and not 0.0 < o.conservative < 1.0:
-        errors.note(f"--conservative {o.conservative:g} lies outside (0, 1); 0.95 is usual")
+        errors.add(f"--conservative {o.conservative:g} lies outside (0, 1); 0.95 is usual")
     errors.raise_errors()
     with reading_progress(len(o.flight_logs), o.json) as done:
         how = {name: getattr(o, name) for name in options.READ_OPTIONS.split()}
@@ -211,8 +211,8 @@ def infer(o: SimpleNamespace, errors: ErrorCollector) -> None:
     settings = errors.read(options.parse_settings, o.settings)
     laws = [name.strip() for name in o.models.split(",") if name.strip()]
     if not laws:
-        errors.note("--models names no law; write for instance --models couzin_2002,vicsek_1995")
-    errors.note(*(f"{path}: no such file" for path in o.tracks if not path.exists()))
+        errors.add("--models names no law; write for instance --models couzin_2002,vicsek_1995")
+    errors.add(*(f"{path}: no such file" for path in o.tracks if not path.exists()))
     errors.raise_errors()
     with _fit_progress(o.json) as done:
         result = estimate.infer(

@@ -230,7 +230,7 @@ def sweep(o: SimpleNamespace, errors: ErrorCollector) -> None:
     fixed = options.collect_settings(errors, o)
     made: Any = None
     if o.scenario is None and (o.out is None or not o.resume):
-        errors.note("sweep: give a scenario and --over, or --out DIR --resume")
+        errors.add("sweep: give a scenario and --over, or --out DIR --resume")
     elif o.scenario is None:
         made = errors.read(recordings.resumed_sweep, o.out, trust=o.trust, over=o.over, settings=fixed, law=o.law)
     else:

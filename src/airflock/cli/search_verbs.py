@@ -280,7 +280,7 @@ def certify(o: SimpleNamespace, errors: ErrorCollector) -> None:
         also["axes"] = errors.read(certificates.check_map_axes, loaded, errors.read(dict, axes))
     errors.read(certificates.check_workers, o.timeout, o.scheduler, o.device)
     if o.resume and o.out is None:
-        errors.note("--resume: name the certificate whose flights are to be continued with --out")
+        errors.add("--resume: name the certificate whose flights are to be continued with --out")
     errors.raise_errors()
     terminal.print_notes(campaign.scenario.notes)
     if o.scheduler is None and o.scenario is not None:

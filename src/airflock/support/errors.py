@@ -190,8 +190,6 @@ class ErrorCollector:
         """Add errors that no reader raises; one that is known already is not repeated."""
         self._lines.update(dict.fromkeys(errors))
 
-    note = add  # of an error, as requests of the command line call it
-
     def merge(self, part: "ErrorCollector") -> bool:
         """Add the errors and notes of a part; return True if it has errors."""
         self.add(*part._lines)
