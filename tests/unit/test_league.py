@@ -116,7 +116,7 @@ def test_measures_of_swarms_are_refused_where_positions_have_images():
         airflock.load("vicsek_1995/ordered", {"metrics.kind": "swarmlab"})
 
 
-def test_laws_are_ranked_where_they_can_be_told_apart(tmp_path, flown):
+def test_laws_are_ranked_where_they_can_be_distinguished(tmp_path, flown):
     result = airflock.league(made(tmp_path), tmp_path / "a", threads=2)
     ranks = {row["law"]: result.ranks(row) for row in result.rows}
     assert ranks == {"vasarhelyi_2018": (1, 1), "viragh_2014": (2, 3), "formation": (2, 3)}
@@ -131,8 +131,8 @@ def test_laws_are_ranked_where_they_can_be_told_apart(tmp_path, flown):
         assert (tmp_path / "a" / "cells" / f"{law}_slow_square" / "replay.html").is_file()
 
 
-def test_equal_laws_are_seldom_told_apart(pytestconfig):
-    """At most a twentieth of leagues of five equal laws tells any two of them apart; 14 of 100 has p < 1e-3."""
+def test_equal_laws_are_seldom_distinguished(pytestconfig):
+    """At most a twentieth of leagues of five equal laws distinguishes any two of them; 14 of 100 has p < 1e-3."""
     rng = np.random.default_rng(pytestconfig.getoption("seed"))
     wrong = 0
     for _ in range(100):

@@ -217,7 +217,7 @@ def _print_tuned(tuning: Any, shown: list[str], as_json: bool = False) -> None:
 def league(o: SimpleNamespace) -> Any:
     """Compare laws on robots in worlds: each is tuned by the same flights and judged on the same held-out seeds.
 
-    The folder then holds result.toml, which anybody can compute anew or add laws to, and league.html with table,
+    The folder then holds result.toml, which anybody can compute again or add laws to, and league.html with table,
     picture and replays.
 
     Example: airflock league league.toml --out table --law mine.py

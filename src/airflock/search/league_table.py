@@ -131,8 +131,8 @@ class League:
         own = self.laws[cell.law]
         settings = {**table.get("set", {}), **table["robots"][cell.robot], **table["worlds"][cell.world]}
         settings |= {**own.get("set", {}), METRICS: metrics}
-        found = load(table["scenario"], settings, own.get("file", cell.law), trust=trust)
-        return _at_speed(found, cell.law)
+        scenario = load(table["scenario"], settings, own.get("file", cell.law), trust=trust)
+        return _at_speed(scenario, cell.law)
 
     def study(self, cell: Cell, *, trust: bool) -> Study | str:
         """Return the study by which a cell is tuned, or why its law cannot fly at all."""
@@ -158,9 +158,9 @@ def _at_speed(scenario: Scenario, law: str) -> Scenario:
         key for key, (_, value) in declared_numbers(scenario).items() if key.startswith("model.") and value == own
     )
     for key in numbers:
-        found = scenario_variant(scenario, {key: speed})
-        if found.model.speed(found.parameters) == speed:
-            return found
+        varied = scenario_variant(scenario, {key: speed})
+        if varied.model.speed(varied.parameters) == speed:
+            return varied
     advice = f"set its speed under [laws.{law}.set]"
     raise ScenarioError([f"{law}: flies at {own:g} m/s, but metrics.v_flock = {speed:g} m/s; {advice}"])
 
@@ -286,23 +286,23 @@ def league(
     airflock.support.errors.StudyError: legue.toml: no such file
     """
     folder, errors = run_place(out), ErrorCollector()
-    found = errors.read(read_league, source, law, folder if resume else None, trust=trust)
+    request = errors.read(read_league, source, law, folder if resume else None, trust=trust)
     errors.raise_errors()
     # Errors of cells come before anything flies; those of several cells are one line.
-    known = {_name(row): row for row in _computed(found)}
-    studies = {cell: errors.read(found.study, cell, trust=trust) for cell in found.cells if str(cell) not in known}
+    known = {_name(row): row for row in _computed(request)}
+    studies = {cell: errors.read(request.study, cell, trust=trust) for cell in request.cells if str(cell) not in known}
     errors.raise_errors("" if source is None else str(source))
-    open_folder(folder, found, resume=resume)
+    open_folder(folder, request, resume=resume)
     rows = []
-    for number, cell in enumerate(found.cells, 1):
+    for number, cell in enumerate(request.cells, 1):
         place = _folder(folder / CELLS, cell._asdict())
-        where = f"cell {number} of {len(found.cells)}, {cell}"
+        where = f"cell {number} of {len(request.cells)}, {cell}"
         row = known.get(str(cell))
-        rows.append(row or fly_cell(found, cell, studies[cell], place, where, scheduler, threads, watch))
-    result = LeagueResult(folder, found, tuple(rows), tuple(compare_laws(rows)))
+        rows.append(row or fly_cell(request, cell, studies[cell], place, where, scheduler, threads, watch))
+    result = LeagueResult(folder, request, tuple(rows), tuple(compare_laws(rows)))
     _save_page(result)
     # last: a folder with a result is complete
-    write_toml_file(folder / RESULT_FILE, result.document(), f"League: {found.table['title']}.")
+    write_toml_file(folder / RESULT_FILE, result.document(), f"League: {request.table['title']}.")
     return result
 
 
@@ -389,7 +389,7 @@ def _check_league(table: Mapping[str, Any], where: str) -> None:
     if isinstance(common, Mapping):
         errors.add(*(f"set.{METRICS} is that of the league; leave it out" for _ in {METRICS} & set(common)))
         missing = [key for key in COMMON if key not in common]
-        why = "by default it differs from law to law, so that they would not be compared alike; give a number"
+        why = "by default it differs from law to law, so that they would not be judged by one measure; give a number"
         errors.add(*(f'set."{key}" is missing: {why}' for key in missing))
     errors.raise_errors(where)
 
@@ -404,28 +404,28 @@ def _folder(cells: Path, row: Mapping[str, Any]) -> Path:
     return cells / f"{row['law']}_{row['robot']}_{row['world']}"
 
 
-def _computed(found: League) -> list[Mapping[str, Any]]:
+def _computed(request: League) -> list[Mapping[str, Any]]:
     """Return the rows of a computed league. Raises StudyError for a damaged one, and for other sizes."""
-    if not found.source:
+    if not request.source:
         return []
-    held = read_toml_file(Path(found.source))
-    with as_error(found.source, StudyError):
+    held = read_toml_file(Path(request.source))
+    with as_error(request.source, StudyError):
         theirs = {key: value for key, value in held["league"].items() if key != "laws"}
-        if theirs != to_toml_values(found.table):
-            raise StudyError(f"{found.source}: is the result of another league; give another --out")
-        rows = [row for row in held["rows"] if row["law"] in found.laws]
-        if any(not row["reason"] and len(row["held_out"]) != found.held_out for row in rows):
-            raise StudyError(f"{found.source}: is damaged: a row has not {found.held_out} held-out flights")
+        if theirs != to_toml_values(request.table):
+            raise StudyError(f"{request.source}: is the result of another league; give another --out")
+        rows = [row for row in held["rows"] if row["law"] in request.laws]
+        if any(not row["reason"] and len(row["held_out"]) != request.held_out for row in rows):
+            raise StudyError(f"{request.source}: is damaged: a row has not {request.held_out} held-out flights")
         if version := held["versions"]["airflock"] if held["versions"]["airflock"] != __version__ else "":
             raise StudyError(
-                f"{found.source}: was computed by Airflock {version}, this is {__version__}; compute it anew"
+                f"{request.source}: was computed by Airflock {version}, this is {__version__}; compute it again"
             )
     return rows
 
 
 def fly_cell(
-    found: League, cell: Cell, study: Study | str, place: Path, where: str, scheduler: str | None, threads: int | None,
-    watch: OnProgress | None,
+    request: League, cell: Cell, study: Study | str, place: Path, where: str, scheduler: str | None,
+    threads: int | None, watch: OnProgress | None,
 ) -> dict[str, Any]:  # fmt: skip
     """Tune a law in its folder and judge it; return its row, with the reason where it does not flock."""
     row: dict[str, Any] = {**cell._asdict(), "reason": ""}
@@ -439,17 +439,17 @@ def fly_cell(
         tuned = run_study(study, place, study_executor(study, scheduler, threads), stage)
         if tuned.dead_reason:
             return row | {"reason": tuned.dead_reason}
-        judged = found.scenario(cell, JUDGED_BY, trust=True)
+        judged = request.scenario(cell, JUDGED_BY, trust=True)
         executor = make_executor(
             [ScenarioTask(judged, int(study.search.precision))], scheduler=scheduler, threads=threads
         )
-        tally = ProgressTally("held-out flights", found.held_out, stage)
-        seeds = [study.seed(PURPOSE, j) for j in range(found.held_out)]
+        tally = ProgressTally("held-out flights", request.held_out, stage)
+        seeds = [study.seed(PURPOSE, j) for j in range(request.held_out)]
         flights = [Flight(0, j, tuned.parameters, seed) for j, seed in enumerate(seeds)]
         with open_run(place, executor) as store:
             flown = store.fly_missing(executor, HELD_OUT, flights, lambda: tally.note(True))
             (tuning,) = store.rows("SELECT count(*) FROM flight WHERE stage <> ?", (HELD_OUT.stage,))[0]
-        scores = [flown[0, j] for j in range(found.held_out)]
+        scores = [flown[0, j] for j in range(request.held_out)]
         _save_replay(place, with_parameters(judged, tuned.parameters), seeds[0])
     except Interrupted:
         raise
@@ -480,7 +480,7 @@ def _interval(values: Sequence[Any]) -> dict[str, float]:
 def compare_laws(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Compare each two laws that flock on one robot in one world, in pairs of held-out flights of one seed.
 
-    Two laws whose difference is the same in all flights are not told apart: it has no spread to judge it by.
+    Two laws whose difference is the same in all flights are not distinguished: it has no spread to judge it by.
     """
     flying = [row for row in rows if not row["reason"]]
     pairs = [(a, b) for a, b in combinations(flying, 2) if (a["robot"], a["world"]) == (b["robot"], b["world"])]

@@ -133,9 +133,9 @@ def survey(n, x, y, z, vx, vy, vz, q, work, shared):
         shared.order[i] = cosines / max(degree, 1.0)
         shared.contacts[i] = contacts
     tridiagonalise(n, work)
-    found = second_smallest(n, work) / n
+    value = second_smallest(n, work) / n
     for i in range(n):
-        shared.connectivity[i] = found
+        shared.connectivity[i] = value
 
 
 def tridiagonalise(n, work):
