@@ -138,6 +138,11 @@ def test_the_command_writes_a_scenario_that_flies_the_disturbance(tmp_path):
         assert flown.faults[0].fault.name == row["kind"] and flown.faults[0].agents[0] == row["agent"]
 
 
+def test_a_flock_that_breaks_as_often_without_a_disturbance_has_no_smallest_dose():
+    line = line_of(lambda: airflock.attack(small(duration=10.0), "wind=1", limit=10.0, probability=0.05, budget=0.01))
+    assert "breaks without any disturbance" in line and " of 100 flights have the event" in line
+
+
 def test_faulty_requests_are_refused_in_a_line():
     scenario = small()
     lines = {

@@ -227,6 +227,20 @@ def test_every_flight_of_a_certificate_with_an_event_is_explained_and_its_plante
         assert text in line, (text, line)
 
 
+def test_a_flight_counts_once_among_those_that_name_a_cause_however_many_leads_it_has():
+    def row(lead, without, events):
+        return causes.CauseRow(lead, without, events, 20, 0.0, 1.0, 0.0, without == "sensors")
+
+    rows = [row(lead, *each) for lead in (8.0, 4.0, 2.0) for each in (("nothing", 15), ("sensors", 1), ("wind", 14))]
+    flights = tuple(causes.WhyResult(small(), seed, "They met", 9.0, (0, 1), tuple(rows)) for seed in (1, 2))
+    found = causes.HitCauses("mine", flights)
+    assert found.text == "Flights with an event, by cause: sensors in 2 of 2."
+    assert found.table.to_dict("list") == {
+        "without": ["sensors", "wind"], "named_in": [2, 0], "events": [6, 84], "events_of_nothing": [90, 90],
+        "tried_in": [2, 2],
+    }  # fmt: skip
+
+
 def test_a_change_of_ones_own_is_compared_like_what_is_taken_away():
     scenario = with_fault("radio_silent")
     own = ["faults[0]", "world.side=400"]

@@ -316,11 +316,16 @@ class HitCauses:
         tried: dict[str, list[tuple[int, int, int]]] = {}
         for flight in self.flights:
             named = {part for cause in flight.causes for part in cause.without.split(TOGETHER)}
-            for row in (row for row in flight.rows if row.without != NOTHING and TOGETHER not in row.without):
-                bare = next(r.events for r in flight.rows if r.lead == row.lead and r.without == NOTHING)
-                tried.setdefault(flight.label(row.without), []).append((row.without in named, row.events, bare))
-        rows = [(name, *np.sum(each, axis=0).tolist(), len(each)) for name, each in tried.items()]
-        table = pd.DataFrame(rows, columns=["without", "named_in", "events", "events_of_nothing", "tried_in"])
+            bare = {row.lead: row.events for row in flight.rows if row.without == NOTHING}
+            alone: dict[str, list[CauseRow]] = {}  # a flight counts once, however many leads it has
+            for row in flight.rows:
+                if row.without != NOTHING and TOGETHER not in row.without:
+                    alone.setdefault(row.without, []).append(row)
+            for name, rows in alone.items():
+                events, of_nothing = sum(row.events for row in rows), sum(bare[row.lead] for row in rows)
+                tried.setdefault(flight.label(name), []).append((name in named, events, of_nothing))
+        lines = [(name, *np.sum(each, axis=0).tolist(), len(each)) for name, each in tried.items()]
+        table = pd.DataFrame(lines, columns=["without", "named_in", "events", "events_of_nothing", "tried_in"])
         return table.sort_values(["named_in", "events"], ascending=[False, True], ignore_index=True)
 
     @property
@@ -557,6 +562,8 @@ def _hits(source: Certificate | Path, trust: bool) -> tuple[str, list[tuple[_Flo
         hits.setdefault((own, event), _FlownFlight(measured, own, campaign.bits, campaign.device))
     if not hits:
         raise FlightError("; ".join([f"{campaign.scenario.name}: nothing to explain: no flight has an event", *notes]))
+    if len({own for own, _ in hits}) < len(hits):
+        notes.append("a flight in which two agents met and one touched the world counts twice, once for each")
     return campaign.scenario.name, [(flown, event) for (_, event), flown in hits.items()], list(dict.fromkeys(notes))
 
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -366,7 +366,7 @@ def attack(
     errors.raise_errors()
     target = _Target(flown, event, probability, threads)
     target.fly_bases()
-    bare = target.events({}, range(JUDGING, JUDGING + JUDGED_FLIGHTS))
+    undisturbed = target.fly_undisturbed()
     rows = []
     for kind in chosen:
         row = _Search(target, kind, time.monotonic() + budget / len(chosen), say).run()
@@ -375,7 +375,7 @@ def attack(
     near = f"Two agents within {flown.metrics.r_coll:g} m"
     near = near if event == "pair" else "An agent touches a wall, an obstacle or the scene"
     notes = ("this is what was found to break the flock; that nothing smaller does is not shown",)
-    return AttackResult(given, near, probability, (int(bare.sum()), len(bare)), tuple(rows), notes)
+    return AttackResult(given, near, probability, undisturbed, tuple(rows), notes)
 
 
 @dataclass
@@ -394,10 +394,7 @@ class _Target:
         happened = self.events({}, tries)
         safe = [seed for seed, event in zip(tries, happened, strict=True) if not event][:SEARCH_FLIGHTS]
         if len(safe) < SEARCH_FLIGHTS:
-            many = f"{int(happened.sum())} of {len(tries)} flights have the event"
-            raise FlightError(
-                f"{self.scenario.name}: breaks without any disturbance: {many}; airflock why explains one"
-            )
+            self._refuse(happened)
         for number, seed in enumerate(safe):
             flight = Flight(self.scenario, seed)
             for moment in range(-1, MOMENTS):
@@ -405,6 +402,17 @@ class _Target:
                 self.bases[number, moment] = (flight.advance(steps=steps) if steps > 0 else flight).branch()
             if self.event == "world" and math.isnan(flight.scores()["clearance"]):
                 raise FlightError(f"{self.scenario.name}: has neither walls nor obstacles nor a scene to touch")
+
+    def fly_undisturbed(self) -> tuple[int, int]:
+        """Return flights with the event, of how many, on the seeds of judging. Raises FlightError where they break."""
+        happened = self.events({}, range(JUDGING, JUDGING + JUDGED_FLIGHTS))
+        if happened.mean() >= self.probability:
+            self._refuse(happened)
+        return int(happened.sum()), len(happened)
+
+    def _refuse(self, happened: NDArray[np.bool_]) -> NoReturn:
+        many = f"{int(happened.sum())} of {len(happened)} flights have the event"
+        raise FlightError(f"{self.scenario.name}: breaks without any disturbance: {many}; airflock why explains one")
 
     def events(self, settings: Settings, seeds: Sequence[int]) -> NDArray[np.bool_]:
         """Return which whole flights have the event, (flight,)."""
