@@ -93,9 +93,7 @@ class Episodes:
             kind = self.scenario.metrics.kind
             raise FlightError(f"{self.scenario.name}: metrics.kind = {kind!r} has no fitness; it rewards nothing")
         most = min(7, self.scenario.agents - 1) if neighbours is None else neighbours
-        self.flights = open_many(
-            self.scenario, range(count), neighbours=most, rays=rays, threads=threads, device=device
-        )
+        self.flights = open_many(self.scenario, count, neighbours=most, rays=rays, threads=threads, device=device)
         bound = float(np.float32(largest_command(self.scenario) if largest is None else largest))
         if not 0.0 < bound < np.inf:
             raise FlightError(f"largest = {largest!r}: give a positive number, the bound of a component of an action")
@@ -211,7 +209,8 @@ class VectorFlock(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin all flights: with one seed s those of the seeds s, s + 1, ...; or with one for each."""
-        seeds = seed if isinstance(seed, Sequence) else None if seed is None else range(seed, seed + self.num_envs)
+        each: Any = seed if np.ndim(seed) else (check_seed(seed) + number for number in range(self.num_envs))
+        seeds = None if seed is None else [check_seed(one) for one in each]
         super().reset(seed=seeds[0] if seeds else None)
         seeds = self._drawn(self.num_envs) if seeds is None else seeds
         if len(seeds) != self.num_envs:
@@ -301,7 +300,7 @@ def parallel_env(scenario: Any, *, agents: int | None = None, seed: int | None =
 
     Raises ScenarioError and FlightError.
     """
-    settings = {**(options.pop("settings", None) or {}), **({"agents": agents} if agents else {})}
+    settings = {**(options.pop("settings", None) or {}), **({} if agents is None else {"agents": agents})}
     return ParallelFlock(scenario, settings, seed, **options)
 
 

@@ -233,6 +233,8 @@ def test_what_cannot_be_observed_or_rewarded_is_refused():
         learn.parallel_env(LAW, settings=BASE, largest=-1.0)
     with pytest.raises(FlightError, match="neighbours = 12: give 0 to 11; of 12 agents"):
         learn.parallel_env(LAW, settings=BASE, neighbours=12)
+    with pytest.raises(AirflockError, match="agents = 0 lies outside"):
+        learn.parallel_env(LAW, agents=0, settings=BASE)
     with pytest.raises(FlightError, match="metrics.kind = 'order' has no fitness"):
         learn.parallel_env("couzin_2002/torus")
     with pytest.raises(FlightError, match="before all have observed"):
@@ -243,3 +245,29 @@ def test_what_cannot_be_observed_or_rewarded_is_refused():
         airflock.open(LAW).perceived()
     with pytest.raises(AirflockError, match="2 scenarios for 3 seeds"):
         airflock.open_many([LAW, LAW], range(3))
+
+
+@pytest.mark.parametrize(
+    "open_", [lambda **keys: airflock.open(LAW, **keys), lambda **k: airflock.open_many(LAW, 1, **k)]
+)
+@pytest.mark.parametrize(
+    ("keys", "match"),
+    [
+        ({"device": "cuda"}, "device = 'cuda': an open flight flies on cpu or python"),
+        ({"neighbours": 2.5}, "neighbours = 2.5: give 0 to 32"),
+        ({"neighbours": 1, "rays": "8"}, "rays = '8': give 0 to 32"),
+    ],
+)
+def test_one_flight_and_many_refuse_the_same_devices_and_observers(open_, keys, match):
+    with pytest.raises(FlightError, match=match):
+        open_(**keys)
+
+
+def test_seeds_of_many_flights_are_one_or_a_list_or_an_array_of_whole_numbers():
+    envs = learn.make_vec(LAW, 2, settings=BASE)
+    first, _ = envs.reset(seed=4)
+    for seeds in ([4, 5], (4, 5), np.array([4, 5])):
+        assert np.array_equal(envs.reset(seed=seeds)[0], first)
+    for seeds in (1.5, "4", [4, 5.5], -1):
+        with pytest.raises(AirflockError, match="seed = "):
+            envs.reset(seed=seeds)

@@ -4,6 +4,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -395,8 +396,8 @@ def check_observable(scenario: Scenario, plan: Plan) -> Plan:
         ("neighbours", count, min(scenario.agents - 1, MOST_OBSERVED), f"of {scenario.agents} agents"),
         ("rays", rays, MOST_OBSERVED * plan.bounded, "" if plan.bounded else "nothing stands in this world"),
     ):
-        if not 0 <= value <= most:
-            raise FlightError(f"{scenario.name}: {name} = {value}: give 0 to {most}{why and f'; {why}'}")
+        if not (isinstance(value, Integral) and 0 <= value <= most):
+            raise FlightError(f"{scenario.name}: {name} = {value!r}: give 0 to {most}{why and f'; {why}'}")
     return plan
 
 

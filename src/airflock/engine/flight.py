@@ -38,6 +38,7 @@ from airflock.scenarios import (
     check_agent,
     check_agents,
     check_seed,
+    check_seeds,
     draw_onsets,
     format_number,
     html_table,
@@ -154,6 +155,8 @@ class FlightState:
         self, scenario: Scenario, seed: int, precision: int, record: bool, start: Any, device: str, absence: bool,
         observe: tuple[int, int] = (0, 0),
     ):  # fmt: skip
+        if device not in Flight.DEVICES:
+            raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(Flight.DEVICES)}")
         self.scenario, self.seed, self.world = scenario, seed, 0
         self.precision, self.record, self.device, self.absence = precision, record, device, absence
         self.observe = observe
@@ -909,8 +912,6 @@ class Flight(FlightActions):
         neighbours: int = 0,
         rays: int = 0,
     ):
-        if device not in self.DEVICES:
-            raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(self.DEVICES)}")
         seed = check_seed(seed)
         self._course = FlightState(
             load_if_named(scenario).with_drawn_scene(seed), seed, precision, record, start, device, absence,
@@ -1164,13 +1165,13 @@ class Flights:
         self, scenarios: Any, seeds: Sequence[int], neighbours: int, rays: int | None, threads: int | None, device: str
     ):
         each = [*scenarios] if isinstance(scenarios, (list, tuple)) else [scenarios] * len(seeds)
-        if not seeds or len(each) != len(seeds):
+        if len(each) != len(seeds):
             raise FlightError(f"open_many: {len(each)} scenarios for {len(seeds)} seeds; give one for all, or one each")
         named = {id(scenario): load_if_named(scenario) for scenario in each}
         self.scenarios: list[Scenario] = [named[id(scenario)] for scenario in each]
         if rays is None:
             rays = 8 if all(plan_of(scenario).bounded for scenario in named.values()) else 0
-        self.observe, self.threads, self.device = (int(neighbours), int(rays)), threads, device
+        self.observe, self.threads, self.device = (neighbours, rays), threads, device
         self.courses = [self._opened(number, seed) for number, seed in enumerate(seeds)]
         states = [course.state for course in self.courses]
         shapes = {(s.agents, s.plan.dimensions, s.plan.observed["neighbours"].stop) for s in states}
@@ -1185,8 +1186,8 @@ class Flights:
 
     def _opened(self, number: int, seed: int) -> FlightState:
         """One flight before its first step."""
-        scenario, seed = self.scenarios[number], check_seed(seed)
-        drawn = scenario.with_drawn_scene(seed)
+        seed = check_seed(seed)
+        drawn = self.scenarios[number].with_drawn_scene(seed)
         return FlightState(drawn, seed, 32, False, None, self.device, False, self.observe)
 
     def reset(self, number: int, seed: int) -> "Flights":
@@ -1252,7 +1253,7 @@ class Flights:
 
 def open_many(
     scenarios: Any,
-    seeds: Iterable[int],
+    seeds: int | Iterable[int],
     *,
     neighbours: int = 7,
     rays: int | None = None,
@@ -1265,8 +1266,8 @@ def open_many(
     ----------
     scenarios : Scenario, str or list
         One for all flights, or one for each seed, of as many agents and axes: a Scenario, a preset's name or a file.
-    seeds : iterable of int
-        One for each flight.
+    seeds : int or iterable of int
+        One for each flight; or how many flights, of the seeds 0, 1, ....
     neighbours : int, optional
         How many of the nearest that it hears each agent observes.
     rays : int, optional
@@ -1294,4 +1295,4 @@ def open_many(
     >>> flights.advance().percepts.offset.shape
     (4, 100, 7, 2)
     """
-    return Flights(scenarios, list(seeds), neighbours, rays, threads, device)
+    return Flights(scenarios, check_seeds(seeds), neighbours, rays, threads, device)
