@@ -1,13 +1,14 @@
 """Flights as environments for learning: PettingZoo for one flight, Gymnasium for one or for many side by side.
 
-Every agent observes what it has measured and heard (`airflock.engine.flight.Percepts`, a row of it), with the delay,
-noise, loss and faults of the scenario, and commands what its law would: a velocity, an acceleration or a direction.
-All agents share one reward, by the fitness of the scenario's metrics. With F the fitness of the flight so far (0 where
-it is not defined yet) and t / T the part of it that is flown, a step is rewarded by the gain of F t / T. So an instant
-that lasts counts the same early and late, and the rewards of an episode add up to its fitness.
+Every agent observes what it has measured and heard (`airflock.engine.flight.Percepts`, a row of
+it), with the delay, noise, loss and faults of the scenario, and commands what its law would: a
+velocity, an acceleration or a direction. All agents share one reward, by the fitness of the
+scenario's metrics. With F the fitness of the flight so far (0 where it is not defined yet) and t /
+T the part of it that is flown, a step is rewarded by the gain of F t / T. So an instant that lasts
+counts the same early and late, and the rewards of an episode add up to its fitness.
 
-`info["law"]` is what each agent's own law commands in the present state: a published law as a policy. Flown by it, a
-flight has the bits of the closed one.
+`info["law"]` is what each agent's own law commands in the present state: a published law as a
+policy. Flown by it, a flight has the bits of the closed one.
 
 Examples
 --------
@@ -80,7 +81,8 @@ def largest_command(scenario: Scenario) -> float:
 class Episodes:
     """Flights of one scenario as episodes: spaces, checked actions, rewards, and which have ended.
 
-    largest : bound of a component of an action, in the unit of the law's command; by default `largest_command`
+    largest : bound of a component of an action, in the unit of the law's command; by default
+              `largest_command`
     """
 
     def __init__(
@@ -123,7 +125,8 @@ class Episodes:
     def step(self, actions: Any) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.bool_]]:
         """Fly to the next decision by actions, (flight, agent, axis); return rewards, and which ended or were cut off.
 
-        Raises FlightError for an action that does not fit its space, and for an episode that is over.
+        Raises FlightError for an action that does not fit its space, and for an episode that is
+        over.
         """
         flights = self.flights
         if self.waiting:
@@ -164,8 +167,8 @@ class FlockEnv(gymnasium.Env[Any, Any]):
     scenario, settings : a Scenario, a preset or a file, and what is changed in it
     options            : law, neighbours, rays, largest: as of `parallel_env`
 
-    `reset(seed=s)` begins the flight that `airflock.open(scenario, seed=s)` opens. Raises ScenarioError and
-    FlightError.
+    `reset(seed=s)` begins the flight that `airflock.open(scenario, seed=s)` opens. Raises
+    ScenarioError and FlightError.
     """
 
     metadata = {"render_modes": []}
@@ -192,8 +195,8 @@ class FlockEnv(gymnasium.Env[Any, Any]):
 class VectorFlock(gymnasium.vector.VectorEnv[Any, Any, Any]):
     """Many flights side by side, in threads: observations (flight, agent, column), actions (flight, agent, axis).
 
-    Options as of `parallel_env`, and threads (all cores). A flight that is over begins anew at the next step, whose
-    action it ignores and whose reward is 0 (`AutoresetMode.NEXT_STEP`).
+    Options as of `parallel_env`, and threads (all cores). A flight that is over begins anew at the
+    next step, whose action it ignores and whose reward is 0 (`AutoresetMode.NEXT_STEP`).
     """
 
     metadata = {"render_modes": [], "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
@@ -294,9 +297,10 @@ def parallel_env(scenario: Any, *, agents: int | None = None, seed: int | None =
 
     scenario : a Scenario, a preset or a file; agents: how many, instead of what it says
     seed     : of the first episode; each one without a seed of its own takes the next
-    options  : settings and law, as in `load`; neighbours, of how many of the nearest that it hears each agent observes
-               offset, relative velocity, age and 1 (7); rays, ways around it (8 where anything stands); largest, bound
-               of a component of an action (what law and body say)
+    options  : settings and law, as in `load`; neighbours, of how many of the nearest that it hears
+               each agent observes offset, relative velocity, age and 1 (7); rays, ways around it (8
+               where anything stands); largest, bound of a component of an action (what law and body
+               say)
 
     Raises ScenarioError and FlightError.
     """

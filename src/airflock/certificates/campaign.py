@@ -39,7 +39,8 @@ class Campaign:
     confidence : of all limits together
     flights    : a number fixed in advance: one look at its end; None: looks as `look_schedule`
                  says
-    flies_intervals : whether each flight draws the numbers of its world from the intervals that the scenario file holds
+    flies_intervals : whether each flight draws the numbers of its world from the intervals that the
+                      scenario file holds
     """
 
     scenario: Scenario

@@ -1,6 +1,7 @@
 """Causes: why two agents met, by ensembles of futures that branch off before it, each with one thing taken away.
 
-Of a certificate, each flight with an event is explained so, with fewer futures, and causes are ranked over all.
+Of a certificate, each flight with an event is explained so, with fewer futures, and causes are
+ranked over all.
 
 The flight is flown up to some seconds before its event. From there many futures draw fresh noise,
 once as the flight was, and once for each intervention: without delay, without a fault. All use the
@@ -139,8 +140,10 @@ class CauseRow:
     """Futures from one moment on under one intervention.
 
     lead    : s from the branch to the event of the flight; without : what was taken away
-    events  : futures in which the event happened, of `futures`; low, high : interval of their probability (95 %)
-    p_value : of no difference to `nothing` (exact McNemar test, after Holm); of two together, to the better one alone
+    events  : futures in which the event happened, of `futures`; low, high : interval of their
+              probability (95 %)
+    p_value : of no difference to `nothing` (exact McNemar test, after Holm); of two together, to
+              the better one alone
     is_named : whether it is a cause
     """
 
@@ -163,7 +166,8 @@ class CauseRow:
 class WhyResult:
     """Why something happened in a flight, and what would have avoided it.
 
-    scenario, seed : what flew; event : what happened, in words; time : when, s; agents : which, where it is a pair
+    scenario, seed : what flew; event : what happened, in words; time : when, s; agents : which,
+                     where it is a pair
     rows  : of each lead and intervention; notes : what was assumed and what was left out
     """
 
@@ -693,7 +697,8 @@ def _nearest_pair(flight: Flight) -> tuple[tuple[int, int], float]:
 class _Ensembles:
     """Futures of a flight: of each lead (steps) and intervention, which of them have the event.
 
-    outcomes : (lead, name) → (future,); bases : lead → flight from which futures branch off; known : its interventions
+    outcomes : (lead, name) → (future,); bases : lead → flight from which futures branch off; known
+               : its interventions
     """
 
     flown: _FlownFlight

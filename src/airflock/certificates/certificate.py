@@ -38,7 +38,8 @@ class EventTiming:
     """Events of the first half of flights against what an even rate would give.
 
     events, early : first events of a flight, and those in its first half
-    expected : share in the first half if the rate is even; chance : of a difference as large as this one
+    expected : share in the first half if the rate is even; chance : of a difference as large as
+               this one
     """
 
     events: int
@@ -89,7 +90,8 @@ class Certificate:
     verdicts  : one for each limit; hazards: timing of events by limit, where events have a moment
     rows      : scores of all flights that were counted, in the order of their seeds
     tolerance : plain values of `airflock.certificates.certification`, empty if not requested
-    splitting : the same of `airflock.certificates.splitting`; over: of `airflock.certificates.certification`
+    splitting : the same of `airflock.certificates.splitting`; over: of
+                `airflock.certificates.certification`
     versions  : of what flew, and on which processor
     seconds, rate : of this process, s; flights per second
     where     : file or name of the scenario, by which flights are flown again
@@ -438,7 +440,8 @@ def with_checksum(document: dict[str, Any]) -> dict[str, Any]:
 class CheckReport:
     """Report of a check.
 
-    flown : flights that were flown again; faults: what does not hold, one line each; notes: what may explain it
+    flown : flights that were flown again; faults: what does not hold, one line each; notes: what
+            may explain it
     """
 
     flown: int

@@ -63,7 +63,8 @@ class LimitVerdict:
 
     probability : the limit per flight; None: it is only to be bounded
     looks    : in their order; all their bounds hold together
-    needs    : flights without an event that would show it, where there is no time for so many; else 0
+    needs    : flights without an event that would show it, where there is no time for so many; else
+               0
     could    : the limit that there was time to show instead
     """
 
@@ -108,7 +109,8 @@ class LimitVerdict:
 class CountResult:
     """Flights that were counted.
 
-    rows  : scores of flight 0, 1, 2, ...; seconds : of this process; rate : flights per second, 0 where unknown
+    rows  : scores of flight 0, 1, 2, ...; seconds : of this process; rate : flights per second, 0
+            where unknown
     """
 
     verdicts: list[LimitVerdict]

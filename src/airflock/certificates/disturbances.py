@@ -78,7 +78,8 @@ class Candidate(NamedTuple):
 class Disturbance:
     """How much of a kind is how much of its dose: `amount` of `unit`, at most `most`.
 
-    numbers : of the fault, by which its dose is given: east and north, share (that is lost), one other, or none, and
+    numbers : of the fault, by which its dose is given: east and north, share (that is lost), one
+              other, or none, and
     then the dose is how long it lasts
     """
 
@@ -150,12 +151,17 @@ def disturbance(text: str, scenario: Scenario) -> Disturbance:
 class AttackRow:
     """The smallest dose of one kind that was found to break the flock.
 
-    dose, low, high : at which the event has the stated probability, with its interval (95 %); inf where it is not
-    reached; unit : of all doses; share : of judged flights with the event at `dose`, or else at the largest dose
-    agent, at, lasts, direction : who (None: all), from when and for how long (s), towards where (degrees from east)
+    dose, low, high : at which the event has the stated probability, with its interval (95 %); inf
+                      where it is not
+    reached; unit : of all doses; share : of judged flights with the event at `dose`, or else at the
+                    largest dose
+    agent, at, lasts, direction : who (None: all), from when and for how long (s), towards where
+                                  (degrees from east)
     curve : for each dose: dose, events, flights, low, high (probability, all together 95 %)
-    settings : keys of the scenario that flies it; seed : of a judged flight with the event, None if there is none
-    flights : flown by the search, in durations of a whole flight; first : those before its first event; None: no event
+    settings : keys of the scenario that flies it; seed : of a judged flight with the event, None if
+               there is none
+    flights : flown by the search, in durations of a whole flight; first : those before its first
+              event; None: no event
     """
 
     kind: str
@@ -179,8 +185,10 @@ class AttackRow:
 class AttackResult:
     """Which smallest disturbances break a flock.
 
-    scenario : as it was given; event : in words; probability : share of flights with the event that counts as broken
-    undisturbed : events and flights without any disturbance, on the seeds of judging; rows : one a kind
+    scenario : as it was given; event : in words; probability : share of flights with the event that
+               counts as broken
+    undisturbed : events and flights without any disturbance, on the seeds of judging; rows : one a
+                  kind
     """
 
     scenario: Scenario

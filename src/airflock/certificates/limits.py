@@ -30,8 +30,10 @@ class EventLimit:
     """An event of a flight, and how often it may happen.
 
     text  : as it was given
-    score, sign, value : the event: an order parameter of the flight, < <= > or >=, and a number in its unit
-    rate, unit : how often at most: per flock hour (h), per drone hour (drone-h) or per flight; None: only to be bounded
+    score, sign, value : the event: an order parameter of the flight, < <= > or >=, and a number in
+                         its unit
+    rate, unit : how often at most: per flock hour (h), per drone hour (drone-h) or per flight;
+                 None: only to be bounded
     is_timed : whether the event, once it has happened, stays true for the rest of the flight
     """
 

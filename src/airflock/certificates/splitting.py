@@ -76,7 +76,8 @@ class Repetition:
     """One run through the levels.
 
     levels : (level, probability of a flight at or below it), falling
-    last   : flights below the last level; seen: (level, probability, least values of the flights of that level)
+    last   : flights below the last level; seen: (level, probability, least values of the flights of
+             that level)
     """
 
     levels: list[tuple[float, float]]
@@ -112,7 +113,8 @@ def run_repetition(
     """Go down level by level until `target`.
 
     start : the flights with the least values among `counted` independent ones
-    mean_branch_lead : mean number of samples before the first crossing from which noise is drawn again
+    mean_branch_lead : mean number of samples before the first crossing from which noise is drawn
+                       again
     size  : flights of a level
     """
     # Subset simulation: each level is a quantile of the scores below the level before, so that its
@@ -168,7 +170,8 @@ def _moved(
 class SplittingEstimate:
     """Estimate of all repetitions together.
 
-    probability, low, high : per flight, mean and 95 % t-interval of the logarithms; nan where refused says why
+    probability, low, high : per flight, mean and 95 % t-interval of the logarithms; nan where
+                             refused says why
     """
 
     target: float
@@ -266,7 +269,8 @@ def estimate_by_splitting(
     """Estimate how often r_min falls to the smallest limit, starting from the flights that were counted.
 
     scenario_file : file of the scenario, by which flights are flown again
-    Returns plain values: target, statements, probability with its interval or why it is refused, worst flights.
+    Returns plain values: target, statements, probability with its interval or why it is refused,
+    worst flights.
     """
     campaign = flyer.campaign
     target = min(limit.value for limit in campaign.limits if limit.score == "r_min")

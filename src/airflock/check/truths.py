@@ -186,13 +186,16 @@ class Trials:
     """A part with its numbers, tried on random cases: what must hold of each answer.
 
     part    : with its name and the truths that it VIOLATES
-    rules   : its rules by kind; letter : by which they read the numbers; numbers : record of its parameters
+    rules   : its rules by kind; letter : by which they read the numbers; numbers : record of its
+              parameters
     answer  : numbers and a case → what the part makes of it, in SI units
     cases   : random cases; seed : of these
-    scale   : a unit scale and a case → the case in other units, and the factors by which its answer grows
+    scale   : a unit scale and a case → the case in other units, and the factors by which its answer
+              grows
     givens  : arguments of rules by name, on which they are tried in single precision
     constants : choices by record name, as a plan has them, beside its own
-    floor   : size below which a difference of answers counts as one of this size; close : what is equal in other units
+    floor   : size below which a difference of answers counts as one of this size; close : what is
+              equal in other units
     separate : True if each number of an answer has a size of its own
     """
 

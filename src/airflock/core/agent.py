@@ -1,7 +1,8 @@
 """One agent, one decision, as plain Python: what a drone runs on board, and what the tests trust.
 
-A `Model` and what one agent perceives go in, a command comes out. Rules are called by their argument names, in
-the order of the drivers: all neighbours, all surfaces, then the decision. In a plane every z is zero.
+A `Model` and what one agent perceives go in, a command comes out. Rules are called by their
+argument names, in the order of the drivers: all neighbours, all surfaces, then the decision. In a
+plane every z is zero.
 """
 
 from collections.abc import Iterable, Mapping
@@ -21,7 +22,8 @@ START = {"sum": 0.0, "min": FAR, "max": -FAR}  # what a reduction gives where no
 class HeardNeighbour(NamedTuple):
     """A neighbour as heard: who it is (its index in the flock), its state, and the age of these data, s.
 
-    fade  : normal number by which its signal is weaker than its distance says; 0 where nothing is drawn
+    fade  : normal number by which its signal is weaker than its distance says; 0 where nothing is
+            drawn
     group : number of its group; -1 where it is in none
     """
 
@@ -66,10 +68,13 @@ def decide(
     surfaces   : distance (m, negative on the far side) and unit normal of every wall and obstacle
     memory     : Memory from the last decision; None before the first
     time       : since the start of the flight, s; period : between two decisions, s
-    index      : own index in the flock; group : number of its group, -1 in none; centre : of the arena, m
-    shared     : what the model's `flock` found for this agent; wing, aero : parameters of the wing and of drag descent
+    index      : own index in the flock; group : number of its group, -1 in none; centre : of the
+                 arena, m
+    shared     : what the model's `flock` found for this agent; wing, aero : parameters of the wing
+                 and of drag descent
     steer      : numbers of the section [steer], for a law whose command is converted
-    percept    : where rays or noise are wanted, one whose methods are bound to a range finder and to random numbers
+    percept    : where rays or noise are wanted, one whose methods are bound to a range finder and
+                 to random numbers
 
     Raises RuleError where a rule asks for what the model does not provide.
     """
@@ -288,12 +293,14 @@ class AgentView:
     true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
     heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
     met         : of each of them, in the same order, whether the topology lets it meet that one
-    terms       : result of the neighbour rule for each of them; 0 for those not met or beyond its reach
+    terms       : result of the neighbour rule for each of them; 0 for those not met or beyond its
+                  reach
     alike       : result of the rule for each of them, had it flown as the agent does
     sums, walls : what the law was given of all neighbours, and of all surfaces
     memory      : the law's memory after the decision
     command     : in the unit of the law's command
-    body        : what the body remembers, such as its thrust or the energy that it used; None if nothing
+    body        : what the body remembers, such as its thrust or the energy that it used; None if
+                  nothing
     """
 
     agent: int

@@ -71,12 +71,14 @@ class Body:
     """Rules that turn a command into a motion, gathered from a module.
 
     accepts     : the COMMAND of the models that it can carry
-    integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
-    Memory      : NamedTuple of what a body keeps from step to step, each field with its value at the start; `move`
-                  takes it as `memory` and returns it behind the velocity
-    limits      : `limits` of any of b, dt, speed, start, wing → what of a scenario the body cannot fly, one line each
-    endures     : `endures` of any of memory, b, wing → how long (s) a battery lasts at least, 0 once it is empty; then
-                  an agent that comes to the ground is absent
+    integration : "old" if a position moves by the velocity before `move`, "new" if by the one after
+                  it
+    Memory      : NamedTuple of what a body keeps from step to step, each field with its value at
+                  the start; `move` takes it as `memory` and returns it behind the velocity
+    limits      : `limits` of any of b, dt, speed, start, wing → what of a scenario the body cannot
+                  fly, one line each
+    endures     : `endures` of any of memory, b, wing → how long (s) a battery lasts at least, 0
+                  once it is empty; then an agent that comes to the ground is absent
     violates    : truths of `airflock.check_body` that do not hold for it, and why (VIOLATES)
     """
 

@@ -1,8 +1,9 @@
 """The contract that all kinds of part share: where members are found, and how their rules are gathered and called.
 
-A rule is a plain function of floats. The names of its arguments are its declaration: a driver computes and passes only
-what the rule requests, in any order. `core.vocabulary` lists the names. A file of rules may bring records of its own
-(Parameters, and a Memory that a rule keeps from call to call); they are checked when the file is gathered.
+A rule is a plain function of floats. The names of its arguments are its declaration: a driver
+computes and passes only what the rule requests, in any order. `core.vocabulary` lists the names. A
+file of rules may bring records of its own (Parameters, and a Memory that a rule keeps from call to
+call); they are checked when the file is gathered.
 """
 
 import inspect
@@ -46,7 +47,8 @@ def along_axes(name: str, text: str, unit: str = "") -> dict[str, str]:
 def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
     """Return the names in a module, a class or a mapping, and its own name: `name`, its NAME, or that of its module.
 
-    A static method is the function inside, so that the check of rules can name it and its decorator.
+    A static method is the function inside, so that the check of rules can name it and its
+    decorator.
     """
     if not isinstance(namespace, Mapping) and not hasattr(namespace, "__dict__"):
         text = shortened(repr(namespace), 80)
@@ -60,21 +62,26 @@ def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str
 class Kind(Mapping[str, Part]):
     """A kind of part: its members by name, and where a scenario names one.
 
-    Members are the files and folders of one folder of the package, and of the folder of the same name in every
-    installed package that declares the entry point `airflock.parts`. No list names them: a file that is laid there is
-    a member. One that cannot be used is left out with a warning of one line; the others go on working.
+    Members are the files and folders of one folder of the package, and of the folder of the same
+    name in every installed package that declares the entry point `airflock.parts`. No list names
+    them: a file that is laid there is a member. One that cannot be used is left out with a warning
+    of one line; the others go on working.
 
     folder  : dotted name of the folder; its last part names the kind ("topologies")
     noun    : what messages call a member
     make    : makes a member from a module and a name, such as `airflock.body`
     member  : class of a member
-    rules   : a file that defines one of them is a member, others are helpers; none: every one is a member
+    rules   : a file that defines one of them is a member, others are helpers; none: every one is a
+              member
     section : table of a scenario file, and field of a Scenario; empty where no section names one
     default : name of the member where a scenario names none
     fixed   : members that are no file; they come first
-    shared  : keys of the section that mean the same for every member, so that they stay when it changes; None: all
-    shares  : a member of the folder without numbers of its own has those of the section: its Parameters are None
-    take    : makes a member from other objects of the caller, if more than a member or a namespace is accepted
+    shared  : keys of the section that mean the same for every member, so that they stay when it
+              changes; None: all
+    shares  : a member of the folder without numbers of its own has those of the section: its
+              Parameters are None
+    take    : makes a member from other objects of the caller, if more than a member or a namespace
+              is accepted
     check   : name of the public function that runs the standing list of truths on a member
     """
 
@@ -189,8 +196,8 @@ def _left_out(where: str, error: Exception) -> str:
 def gather(member: Callable[..., Part], found: Mapping[str, Any], **given: Any) -> Part:
     """Make a member of a kind from names: what is not given stands in the name of its field, values in capitals.
 
-    A rule or a record (a field without a default, or None by default) has the name of its field: `neighbour`, `Sums`.
-    A value has that name in capitals: VIOLATES, RATES.
+    A rule or a record (a field without a default, or None by default) has the name of its field:
+    `neighbour`, `Sums`. A value has that name in capitals: VIOLATES, RATES.
     """
     values = dict(given)
     for item in fields(member):  # type: ignore[arg-type]
@@ -204,7 +211,8 @@ def gather(member: Callable[..., Part], found: Mapping[str, Any], **given: Any) 
 def merge_parameters(common: type, record: Any, owner: str) -> type:
     """Merge the Parameters of a file with the numbers that all parts of its kind have.
 
-    common : record of those numbers; record : the file's, None where it has none; owner : such as "radio mine"
+    common : record of those numbers; record : the file's, None where it has none; owner : such as
+             "radio mine"
     """
     if record is None:
         return common
@@ -222,7 +230,8 @@ def check_memory_record(
 ) -> None:
     """Check the record that a rule keeps from call to call: a NamedTuple with start values, which the rule requests.
 
-    argument_names : names that the rule requests; record : what the file defines under `name`, if anything
+    argument_names : names that the rule requests; record : what the file defines under `name`, if
+                     anything
     """
     word = name.lower()
     # Without a start value the first call of a rule would read scratch of the driver, so every

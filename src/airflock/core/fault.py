@@ -1,8 +1,8 @@
 """The contract of a fault: plain rules, each for the stage of a flight that it disturbs.
 
-A kind of fault is a module with `Parameters` and one or more of seven rules. Its argument names are the declaration, as
-of every rule (`core.vocabulary`). A driver calls a rule only while the fault lasts, and contains it only if a
-scenario names its kind.
+A kind of fault is a module with `Parameters` and one or more of seven rules. Its argument names are
+the declaration, as of every rule (`core.vocabulary`). A driver calls a rule only while the fault
+lasts, and contains it only if a scenario names its kind.
 """
 
 from collections import namedtuple
@@ -62,7 +62,8 @@ class Fault:
 
     name       : how scenarios refer to it
     Parameters : record of its numbers (`core.parameters.Parameters`)
-    sense      : what it makes of the own state as measured, which the law acts on and others are sent
+    sense      : what it makes of the own state as measured, which the law acts on and others are
+                 sent
     tell       : what it makes of the state that is sent, after `sense`
     radio      : what is left of the radio's range, outwards and inwards
     clock      : how far the clock is ahead, which stamps packets and dates the packets of others

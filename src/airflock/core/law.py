@@ -59,7 +59,8 @@ Rule = Callable[..., Any]
 def bound_values(rules: Iterable[Any]) -> dict[types.FunctionType, dict[str, Any]]:
     """Return what free names mean now, for each of the user's own rules and of the functions that they call.
 
-    Numbers, texts and NamedTuple classes are values; functions are followed. Rules of the package have no entry.
+    Numbers, texts and NamedTuple classes are values; functions are followed. Rules of the package
+    have no entry.
     """
     found: dict[types.FunctionType, dict[str, Any]] = {}
     left = [rule for rule in rules if isinstance(rule, types.FunctionType)]

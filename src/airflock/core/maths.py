@@ -1,6 +1,7 @@
 """Vectors of three floats, transfer functions and the braking curve; plain scalar text for rules to call.
 
-Lengths are guarded by `TINY`, so that no rule divides by zero: the unit vector of nothing is nothing.
+Lengths are guarded by `TINY`, so that no rule divides by zero: the unit vector of nothing is
+nothing.
 """
 
 import math
@@ -34,7 +35,8 @@ def clamp(x, low, high):
 def arc_cosine(c):
     """Angle (rad) whose cosine is c, clamped to [-1, 1]; within 2e-8 (Abramowitz and Stegun 1964, 4.4.46).
 
-    A polynomial and a root instead of the C library's acos, whose scalar call would stop vectorisation.
+    A polynomial and a root instead of the C library's acos, whose scalar call would stop
+    vectorisation.
     """
     s = min(abs(c), 1.0)
     a = arc_over_root(s) * math.sqrt(1.0 - s)
@@ -55,8 +57,8 @@ def arc_over_root(s):
 def angle_between(ax, ay, az, bx, by, bz):
     """Angle (rad) between two unit vectors, within 2e-8; a quarter turn where one of them is zero.
 
-    A cosine near 1 says little of a small angle (1.5e-8 rad are one unit in its last place in double precision, 3e-4 in
-    single), so 1 - |cosine| comes from the cross product there.
+    A cosine near 1 says little of a small angle (1.5e-8 rad are one unit in its last place in
+    double precision, 3e-4 in single), so 1 - |cosine| comes from the cross product there.
     """
     c = ax * bx + ay * by + az * bz
     s = min(abs(c), 1.0)

@@ -1,7 +1,8 @@
 """The contracts of an order parameter and of a set of them: vocabulary, rules and records.
 
-The rules of an order parameter measure a flock at one instant; `OVER_TIME` says how instants combine. A set holds order
-parameters that are measured together, and the fitness by which a flight is judged.
+The rules of an order parameter measure a flock at one instant; `OVER_TIME` says how instants
+combine. A set holds order parameters that are measured together, and the fitness by which a flight
+is judged.
 """
 
 from collections.abc import Callable, Mapping
@@ -100,21 +101,28 @@ ABSENCE = {  # by how instants combine, `contract.OVER_TIME`
 class Metric:
     """An order parameter: rules that measure a flock at one instant, and how instants combine.
 
-    within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at its start values,
-              while no two agents are nearer than that. A driver may then skip the pair loop.
-    linked_within : `linked_within(q)`, m; the metric promises that no two agents farther apart than that are linked.
+    within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at
+              its start values, while no two agents are nearer than that. A driver may then skip the
+              pair loop.
+    linked_within : `linked_within(q)`, m; the metric promises that no two agents farther apart than
+                    that are linked.
               Large flocks then look for links among those who are near
-    settled : whether nobody farther than `beyond` (m) can change what `pair` adds up to for an agent. Large flocks then
-              look no farther than they must
+    settled : whether nobody farther than `beyond` (m) can change what `pair` adds up to for an
+              agent. Large flocks then look no farther than they must
     clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
-    survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that `agent` may read;
+    survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that
+                `agent` may read;
               `workspace` of any of n, q, wing gives its scratch
     reports : of every order parameter that comes out: its unit and what it means
-    formulas : of the same: formula (LaTeX), range, and how to read it where that needs a sentence (FORMULAS)
-    needs   : of those that depend on them: numbers of the metric, such as lengths, that tracks alone do not say (NEEDS)
-    Parameters : record of numbers of its own, which its rules read from q beside those that every set has
+    formulas : of the same: formula (LaTeX), range, and how to read it where that needs a sentence
+               (FORMULAS)
+    needs   : of those that depend on them: numbers of the metric, such as lengths, that tracks
+              alone do not say (NEEDS)
+    Parameters : record of numbers of its own, which its rules read from q beside those that every
+                 set has
     courses : the same of each field of Sample that is no order parameter by itself (COURSES)
-    total   : from the combined values of a whole flight to named order parameters; by default they are these
+    total   : from the combined values of a whole flight to named order parameters; by default they
+              are these
     violates : truths of `airflock.check_metric` that do not hold for it, and why (VIOLATES)
     """
 
@@ -232,12 +240,14 @@ class MetricSet:
     name       : how scenarios refer to it (metrics.kind)
     Parameters : record behind the section [metrics]
     chosen     : `chosen(q)` → the metrics, where a parameter decides; else `metrics`
-    fitness    : of any of values, agents, duration (s), q → named numbers, from the order parameters of one flight
+    fitness    : of any of values, agents, duration (s), q → named numbers, from the order
+                 parameters of one flight
     reports    : of what `fitness` gives: unit and meaning
     formulas, needs : as those of a metric, of all that it reports
     best       : the order parameter that is larger in a better flight; empty if none is
     violates   : truths of `airflock.check_metric` that its fitness breaks, and why (VIOLATES)
-    errors     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one line each
+    errors     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one
+                 line each
     """
 
     name: str

@@ -91,21 +91,30 @@ class Model:
     name         : how scenarios refer to it
     Parameters   : record of parameters (`core.parameters.Parameters`)
     command      : "velocity" (m/s), "acceleration" (m/s²) or "heading" (unit vector)
-    reach        : `reach(p)`, largest interaction radius, m; without it the radio alone decides who is heard
+    reach        : `reach(p)`, largest interaction radius, m; without it the radio alone decides who
+                   is heard
     sight        : `sight(p)`, how far percept.cast looks, m
-    neighbour    : pair rule → Sums; Sums its NamedTuple; reduce: how fields combine where not by a sum
+    neighbour    : pair rule → Sums; Sums its NamedTuple; reduce: how fields combine where not by a
+                   sum
     boundary     : surface rule → Walls
-    flock        : the one rule of the whole flock: fills the columns of Shared, which `decide` may read as `shared`
-    workspace    : `workspace` of any of n, p, wing, aero → NamedTuple of (rows, columns), the scratch of `flock`
-    wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away have no effect; without it all are evaluated
+    flock        : the one rule of the whole flock: fills the columns of Shared, which `decide` may
+                   read as `shared`
+    workspace    : `workspace` of any of n, p, wing, aero → NamedTuple of (rows, columns), the
+                   scratch of `flock`
+    wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away have no effect; without it
+                   all are evaluated
     decide       : → command x, y, z and a Memory if the model declares one
     added        : a law whose command is added to that of `decide` (`add_laws`)
-    steer        : makes of the command of `decide` one of the kind `command`, which the body takes (`steered_law`)
-    usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
+    steer        : makes of the command of `decide` one of the kind `command`, which the body takes
+                   (`steered_law`)
+    usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for
+              them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
     violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
-    terms    : vectors among its Sums (their fields without x, y, z) → what the law calls them, and their unit (TERMS)
-    parts    : parts of the law in the paper's order → names of the parameters of each; a page sorts sliders so (PARTS)
+    terms    : vectors among its Sums (their fields without x, y, z) → what the law calls them, and
+               their unit (TERMS)
+    parts    : parts of the law in the paper's order → names of the parameters of each; a page sorts
+               sliders so (PARTS)
     """
 
     name: str
@@ -242,9 +251,9 @@ FIRST_ONLY_RULES = ("neighbour", "boundary", "Memory", "reach", "sight", "wall_r
 def add_laws(base: Model, extra: Model) -> Model:
     """The law `base` with the command of `extra` added to its own.
 
-    `extra` may have a rule of the whole flock where `base` has none; its `decide` takes no parameters `p` of the model,
-    only records that a scenario has once. Raises RuleError where the two do not fit. Equal arguments give the same
-    rules, and so the same driver.
+    `extra` may have a rule of the whole flock where `base` has none; its `decide` takes no
+    parameters `p` of the model, only records that a scenario has once. Raises RuleError where the
+    two do not fit. Equal arguments give the same rules, and so the same driver.
     """
     for error in composition_errors(base, extra):
         raise RuleError(error)

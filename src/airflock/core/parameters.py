@@ -1,8 +1,8 @@
 """Parameters: declared once, with unit, range, meaning and source.
 
-Help texts, validation, sliders, search bounds and the kernels' table rows all come from these declarations. A record
-is a frozen dataclass derived from `Parameters`; its numbers are floats, its choices strings that are compile-time
-constants in a kernel.
+Help texts, validation, sliders, search bounds and the kernels' table rows all come from these
+declarations. A record is a frozen dataclass derived from `Parameters`; its numbers are floats, its
+choices strings that are compile-time constants in a kernel.
 """
 
 import inspect
@@ -304,7 +304,8 @@ def points(unit: str, depth: int, *, meaning: str, source: str = "", axes: int =
 def column(default: tuple[float, ...], unit: str, *, most: int, meaning: str, source: str = "") -> Any:
     """Declare a column of at most so many numbers, which rules of a law read one by one, `p.name[k]`.
 
-    It may have any length. Unlike a vector it is not written out in a driver, and its numbers have no names.
+    It may have any length. Unlike a vector it is not written out in a driver, and its numbers have
+    no names.
     """
     return field(default=default, metadata={"airflock": Points(unit, 1, meaning, source, most)})
 

@@ -1,6 +1,7 @@
 """The pilot of one agent, in plain Python: it hears its neighbours, decides, and says at which velocity to fly.
 
-A pilot checks its law once, when it is built: a law that requests what a drone lacks is refused then, not in flight.
+A pilot checks its law once, when it is built: a law that requests what a drone lacks is refused
+then, not in flight.
 """
 
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
@@ -44,8 +45,10 @@ class PacketPolicy:
     """Policy for the data of neighbours: how long they count, and how they are carried forward.
 
     extrapolate : carry them forward with their own velocity to the moment of the decision
-    forget      : age (s) beyond which they say nothing; by the rule of silence they count up to its patience
-    once        : they say something at the one decision after they came, as over a radio of one constant delay
+    forget      : age (s) beyond which they say nothing; by the rule of silence they count up to its
+                  patience
+    once        : they say something at the one decision after they came, as over a radio of one
+                  constant delay
     early       : how far (s) in the future they may seem to be, by two clocks that differ
     in_order    : believe stamps: what is older than what is known says nothing
     radio, k    : kind of radio whose rule carries them forward instead, and its numbers
@@ -116,12 +119,15 @@ class Pilot:
     silence  : the rule for neighbours that are lost; None, or one that flies on: they are forgotten
     flat     : fly in a plane: every z is zero
     seed     : of the random numbers that a law may ask for
-    wing, aero, steer : numbers of the wing, of drag descent and of [steer], for laws that ask for them
-    gets_flock_solution : the law decides for the whole flock; the caller passes its solution to `decide`
+    wing, aero, steer : numbers of the wing, of drag descent and of [steer], for laws that ask for
+                        them
+    gets_flock_solution : the law decides for the whole flock; the caller passes its solution to
+                          `decide`
     topology, t : kind of topology, which selects among the heard, and its parameters; None: all
     groups   : of each agent the number of its group, -1 in none; empty where nobody is in one
 
-    Raises RuleError where the law asks for what a drone does not have, or gives what is no velocity.
+    Raises RuleError where the law asks for what a drone does not have, or gives what is no
+    velocity.
     """
 
     def __init__(
@@ -187,7 +193,8 @@ class Pilot:
     def receive(self, sender: int, state: State, sent_at: float, now: float, *, is_standing: bool = False) -> bool:
         """Take note of a neighbour's state that held at sent_at (s); False if it is old, of the future or nan.
 
-        stands : it says that it holds or returns, so that less is to be feared of it once it is lost
+        stands : it says that it holds or returns, so that less is to be feared of it once it is
+                 lost
         """
         known = self.packets.get(sender)
         if sender == self.index or not all(map(isfinite, state)) or not sent_at <= now + self.hearing.early:
@@ -268,9 +275,11 @@ class Pilot:
         percept : of a real range finder; without it the map answers
         goal    : where the law is to go, m; without one its offset is zero
         time    : of the flight (s), if that is not the own clock's
-        only    : neighbours that count, by their number, where somebody knows who is in sight; None: all that are heard
+        only    : neighbours that count, by their number, where somebody knows who is in sight;
+                  None: all that are heard
         shared  : what a law for the whole flock found for this agent
-        fades   : normal numbers by which signals are weaker, by who sends them, where somebody draws them
+        fades   : normal numbers by which signals are weaker, by who sends them, where somebody
+                  draws them
         """
         if self.flat:
             own, goal = flattened(own), None if goal is None else (*goal[:2], 0.0)

@@ -1,9 +1,10 @@
 """The contract of a radio: which packets of others arrive, when, and where their senders are believed to be since.
 
-A kind of radio is a module with `Parameters` and plain rules. `missed` returns the probability that nothing of what one
-agent sends another in a decision arrives; a random number then decides, for all pairs in vectors. `receive` is the
-longer form: it is handed random numbers and what is kept of the pair, and decides itself. The argument names are the
-declaration, as of every rule (`core.vocabulary`).
+A kind of radio is a module with `Parameters` and plain rules. `missed` returns the probability that
+nothing of what one agent sends another in a decision arrives; a random number then decides, for all
+pairs in vectors. `receive` is the longer form: it is handed random numbers and what is kept of the
+pair, and decides itself. The argument names are the declaration, as of every rule
+(`core.vocabulary`).
 """
 
 import math
@@ -139,19 +140,26 @@ class Radio:
     Parameters : record of its numbers; delay, range, loss and loss_at are among them
     missed     : probability that nothing of what an agent sends another in one decision arrives
     missed_few : the same where each of RATES sends at most FEW packets in a decision; quicker
-    receive    : 1.0 if a packet arrives, else 0.0, and behind it Packet where there is one. It is called once for each
-                 pair in range and decision
-    late       : how much later than `delay` a packet comes, s. While one is under way, those behind it are dropped
-    see        : instead of what is sent, what an agent sees itself: offset (m) and velocity (m/s) at which it believes
-                 another after a picture. Its own errors of position, and the packets of the other one, do not matter
-    carry      : where the sender of the newest packet is believed to be now, m; without it, where it was then
-    lasts      : 1.0 while the newest packet counts, by its age; without it, until the next one comes
-    Packet     : NamedTuple of what `receive` keeps of one pair, each field with its value at the start
-    rates      : at most two numbers of Parameters, packets per second; `missed` may ask how many each sends (LINKS)
+    receive    : 1.0 if a packet arrives, else 0.0, and behind it Packet where there is one. It is
+                 called once for each pair in range and decision
+    late       : how much later than `delay` a packet comes, s. While one is under way, those behind
+                 it are dropped
+    see        : instead of what is sent, what an agent sees itself: offset (m) and velocity (m/s)
+                 at which it believes another after a picture. Its own errors of position, and the
+                 packets of the other one, do not matter
+    carry      : where the sender of the newest packet is believed to be now, m; without it, where
+                 it was then
+    lasts      : 1.0 while the newest packet counts, by its age; without it, until the next one
+                 comes
+    Packet     : NamedTuple of what `receive` keeps of one pair, each field with its value at the
+                 start
+    rates      : at most two numbers of Parameters, packets per second; `missed` may ask how many
+                 each sends (LINKS)
     violates   : truths of `airflock.check_radio` that do not hold for it, and why (VIOLATES)
 
-    Of a radio with `missed`, `receive`, `late` or `see` the newest packet counts until the next one comes, as long as
-    its sender is in range. Without any of them each packet counts at the decision that it comes at.
+    Of a radio with `missed`, `receive`, `late` or `see` the newest packet counts until the next one
+    comes, as long as its sender is in range. Without any of them each packet counts at the decision
+    that it comes at.
     """
 
     name: str
@@ -252,7 +260,8 @@ class PacketReception:
     """Reception of the packets between the members of a flock: which arrive, and how late.
 
     radio, k     : kind of radio and its numbers
-    seed, agents : by which its random numbers are drawn, those of the same pair in a flight of this seed and size
+    seed, agents : by which its random numbers are drawn, those of the same pair in a flight of this
+                   seed and size
     period       : time between two decisions, s
     """
 

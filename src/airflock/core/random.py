@@ -1,9 +1,10 @@
 """Counter-based random numbers: a number is a function of (seed, stream, world, step, agent).
 
-Philox 4x32-10 (Salmon et al. 2011). The counter holds agent, step, stream with draw, and world; the key holds the
-seed. So no number depends on the order of evaluation, on threads or on who else draws, and a new noise source never
-shifts another. The functions named in `PRIMITIVES` are written here for plain Python integers and floats; a
-device binds its own form of the same arithmetic (`airflock.engine.primitives`).
+Philox 4x32-10 (Salmon et al. 2011). The counter holds agent, step, stream with draw, and world; the
+key holds the seed. So no number depends on the order of evaluation, on threads or on who else
+draws, and a new noise source never shifts another. The functions named in `PRIMITIVES` are written
+here for plain Python integers and floats; a device binds its own form of the same arithmetic
+(`airflock.engine.primitives`).
 """
 
 import math

@@ -1,8 +1,9 @@
 """The contract of a sensor: what an agent measures of its own position and velocity, as plain rules.
 
-A kind of sensor is a module with `Parameters` and one of two rules. `measure` turns the true state into the one
-that is believed. `error` is the shorter form for errors that are added to the truth in the same way along each axis.
-The argument names are the declaration, as of every rule (`core.vocabulary`).
+A kind of sensor is a module with `Parameters` and one of two rules. `measure` turns the true state
+into the one that is believed. `error` is the shorter form for errors that are added to the truth in
+the same way along each axis. The argument names are the declaration, as of every rule
+(`core.vocabulary`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -74,14 +75,18 @@ class Sensor:
 
     name       : how scenarios refer to it
     Parameters : record of its numbers; `period` is among them
-    measure    : true state, Memory and random numbers → position (m), velocity (m/s) and, behind them, Memory. It is
-                 called once for each agent and decision; what an agent sends carries the errors of its last measurement
-    error      : error of position (m) and of velocity (m/s) along one axis → the same after one period. It is called
-                 for each axis, and again for what is sent, whose errors are drawn apart (authors' program of
-                 Vásárhelyi et al. 2018)
-    Memory     : NamedTuple of what `measure` keeps of one agent, each field with its value at the start
-    exact      : `exact(s)`, True if it has no error with these numbers; a flight then spends nothing on it
-    bounds     : `bounds` of any of s, period, dt → what of a scenario it cannot measure, one line each
+    measure    : true state, Memory and random numbers → position (m), velocity (m/s) and, behind
+                 them, Memory. It is called once for each agent and decision; what an agent sends
+                 carries the errors of its last measurement
+    error      : error of position (m) and of velocity (m/s) along one axis → the same after one
+                 period. It is called for each axis, and again for what is sent, whose errors are
+                 drawn apart (authors' program of Vásárhelyi et al. 2018)
+    Memory     : NamedTuple of what `measure` keeps of one agent, each field with its value at the
+                 start
+    exact      : `exact(s)`, True if it has no error with these numbers; a flight then spends
+                 nothing on it
+    bounds     : `bounds` of any of s, period, dt → what of a scenario it cannot measure, one line
+                 each
     violates   : truths of `airflock.check_sensor` that do not hold for it, and why (VIOLATES)
     """
 
@@ -161,9 +166,11 @@ class SensorState:
     """Sensor of one agent, measurement after measurement.
 
     sensor, s   : kind of sensor and its numbers
-    seed, agent : by which its random numbers are drawn, those of the same agent in a flight of this seed
+    seed, agent : by which its random numbers are drawn, those of the same agent in a flight of this
+                  seed
     flat        : whether the agent flies in a plane, where nothing is wrong along the third axis
-    words       : four random words by the numbers of a measurement and a draw, where somebody has them already
+    words       : four random words by the numbers of a measurement and a draw, where somebody has
+                  them already
     """
 
     def __init__(self, sensor: Sensor, s: Any, seed: int, agent: int, *, flat: bool, words: Words | None = None):

@@ -1,9 +1,10 @@
 """Silence: a neighbour that is not heard may be near. A plain rule, for a drone on board and for a simulated one.
 
-Nobody heard is not nobody there. Flocks whose agents forget a silent neighbour fly into it. An agent that follows this
-rule stops as soon as a neighbour whose data have grown old could be near by now, and stays where it stopped until it
-hears of it again or gives it up, and for a pause beyond. Until data are that old, they count as heard.
-Of forty simulated flights with 15 s of silence, forty came below 3 m without the rule and none with it
+Nobody heard is not nobody there. Flocks whose agents forget a silent neighbour fly into it. An
+agent that follows this rule stops as soon as a neighbour whose data have grown old could be near by
+now, and stays where it stopped until it hears of it again or gives it up, and for a pause beyond.
+Until data are that old, they count as heard. Of forty simulated flights with 15 s of silence, forty
+came below 3 m without the rule and none with it
 (`docs/decisions/0021-stop-near-silent-neighbours.md`).
 """
 
@@ -75,8 +76,8 @@ def with_defaults(s: SilenceParameters, speed: float, delay: float = 0.0, rule: 
 def for_standing_neighbour(s: SilenceParameters) -> SilenceParameters:
     """Return the parameters for a lost neighbour that announced to hold or return: its reach grows half as fast.
 
-    Its distance is measured from where an agent is now, so that half of twice the flock's speed still covers one that
-    has flown on at the speed of the flock. At the full speed, four of forty
+    Its distance is measured from where an agent is now, so that half of twice the flock's speed
+    still covers one that has flown on at the speed of the flock. At the full speed, four of forty
     fleets in which one drone holds because its clock is 0.5 s ahead came below 3 m.
     """
     assert s.closing is not None, "complete"
@@ -86,7 +87,8 @@ def for_standing_neighbour(s: SilenceParameters) -> SilenceParameters:
 def counts(age, s):
     """1.0 if what is known of a neighbour, data of this age (s), still counts as heard, else 0.0.
 
-    One missing packet says nothing of where its sender is; who forgot it at once would not be repelled by it.
+    One missing packet says nothing of where its sender is; who forgot it at once would not be
+    repelled by it.
     """
     return 1.0 if age <= s.patience else 0.0
 
@@ -94,7 +96,8 @@ def counts(age, s):
 def could_be_near(distance, age, s):
     """1.0 if a neighbour, last known at a distance (m) from here, data of this age (s), could be near by now, else 0.0.
 
-    Data younger than `s.patience` stop nobody. Its reach grows at `s.closing`; it is given up at the age `s.forget`.
+    Data younger than `s.patience` stop nobody. Its reach grows at `s.closing`; it is given up at
+    the age `s.forget`.
     """
     # The reach grows with the whole age of the data, not from `patience` on: for so long the
     # neighbour may have flown. The weaker rule left 31 of 40 flights below 3 m.
@@ -105,7 +108,8 @@ def could_be_near(distance, age, s):
 def stands_until(near, now, until, s):
     """Time (s) until which an agent stands, from that of the last decision and whether one it lost could be near now.
 
-    Who went on at the first decision in which it hears all would creep: 1 to 2 m each time, towards who does the same.
+    Who went on at the first decision in which it hears all would creep: 1 to 2 m each time, towards
+    who does the same.
     """
     return now + s.pause + GRACE if near > 0.5 else until
 
@@ -113,6 +117,7 @@ def stands_until(near, now, until, s):
 def back(dx, dy, dz, s):
     """Velocity (m/s) of an agent that stopped, from the offset (m) to where it stopped; at most half of `s.closing`.
 
-    A body that is pushed about would else drift: by 2.4 m in 15 s where its noise is that of the paper's drones.
+    A body that is pushed about would else drift: by 2.4 m in 15 s where its noise is that of the
+    paper's drones.
     """
     return shorten(s.hold * dx, s.hold * dy, s.hold * dz, 0.5 * s.closing)

@@ -32,7 +32,8 @@ class Topology:
     name : how scenarios refer to it
     meet : fills the row `met` with 1.0 for each neighbour that the agent meets
     flat : it is defined in a plane only
-    near : its choice within any distance depends on no agent farther away: then cells as wide as the reach of a law do
+    near : its choice within any distance depends on no agent farther away: then cells as wide as
+           the reach of a law do
     Parameters : record of its numbers; those that a scenario can name share one
     violates   : truths of `airflock.check_topology` that do not hold for it, and why (VIOLATES)
     """
@@ -55,7 +56,8 @@ class Topology:
 def topology(namespace: Any, name: str = "") -> Topology:
     """Gather a topology of a user's own from a module, a class or a mapping of names.
 
-    namespace : holds the rule meet, and if it likes Parameters (numbers only), FLAT, NEAR and VIOLATES
+    namespace : holds the rule meet, and if it likes Parameters (numbers only), FLAT, NEAR and
+                VIOLATES
 
     Raises RuleError if it has no such rule, or one that asks for what there is not.
     """

@@ -1,7 +1,7 @@
 """The vocabulary of the rule contract: what each kind of rule may request by the names of its arguments.
 
-All quantities are in SI units; a difference is always neighbour minus own. The chapter of each kind describes its
-part. Own, Percept and Mean are the records behind some of the names.
+All quantities are in SI units; a difference is always neighbour minus own. The chapter of each kind
+describes its part. Own, Percept and Mean are the records behind some of the names.
 """
 
 from typing import NamedTuple
@@ -33,8 +33,9 @@ class Own(NamedTuple):
 class Percept(NamedTuple):
     """Percept of an agent beside its neighbours: time (s), offsets to the arena's centre and the goal (m), rays, noise.
 
-    Without a goal its offset is zero. An engine binds the methods to its world and its streams; a drone passes a
-    Percept of its own with a real range finder. As they stand here the world is empty and quiet.
+    Without a goal its offset is zero. An engine binds the methods to its world and its streams; a
+    drone passes a Percept of its own with a real range finder. As they stand here the world is
+    empty and quiet.
     """
 
     time: float
@@ -52,8 +53,8 @@ class Percept(NamedTuple):
     def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
         """Free distance (m) for a sphere of this radius (m) along the unit vector u, at most `length` (m).
 
-        It ends at the arena's walls, its obstacles and what stands in the scene; a radius of 0 is a thin ray. A model
-        that casts declares `sight(p)`, the largest length + radius (m).
+        It ends at the arena's walls, its obstacles and what stands in the scene; a radius of 0 is a
+        thin ray. A model that casts declares `sight(p)`, the largest length + radius (m).
         """
         return length
 

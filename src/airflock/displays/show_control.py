@@ -96,7 +96,8 @@ def detour_point(
     """Return a point (3,) beside the first hull on the way from a place to a point (both (3,)), level with that or
     above it.
 
-    others : places (n, 3) of drones that fly, beside most of which there is room; tried : points (n, 3) of no avail
+    others : places (n, 3) of drones that fly, beside most of which there is room; tried : points
+             (n, 3) of no avail
     """
     met = hulls[hulls_in_the_way(position[None], point[None], hulls)[0]]
     first = met[np.linalg.norm(met - position, axis=1).argmin()]
@@ -167,8 +168,10 @@ class ShapeReport:
 
     time     : until every surviving drone was within 1 m of its point, s; nan if never
     error, worst : mean and largest distance of a surviving drone from its point at the end, m
-    drones   : surviving; collisions : of two drones; struck : by one that falls; hulls : with one that hovers
-    reassigned : number of reassignments; detours : how often a drone was sent around what held it up
+    drones   : surviving; collisions : of two drones; struck : by one that falls; hulls : with one
+               that hovers
+    reassigned : number of reassignments; detours : how often a drone was sent around what held it
+                 up
     """
 
     time: float
@@ -187,8 +190,10 @@ class ShowControl:
 
     flight  : of all drones, from the first shape to the last
     target  : of each drone the number of its point, also of those that have failed
-    way, left : where all set out and where to (drone, 3), m; when, and how long they are under way, s
-    around  : by drone: where it flies first, for something stands in its way; tried : all such points of this shape
+    way, left : where all set out and where to (drone, 3), m; when, and how long they are under way,
+                s
+    around  : by drone: where it flies first, for something stands in its way; tried : all such
+              points of this shape
     failing : whether some will fail: one driver then flies the whole show
     hulls   : places of those that hover; falling : position and velocity (6,) of those that fall
     """

@@ -200,7 +200,8 @@ def fly_show(
 ) -> Show:
     """Fly a display and measure it.
 
-    shapes  : points (point, 3) of each, m; failing : share of the drones that fail on the way, evenly over the shapes
+    shapes  : points (point, 3) of each, m; failing : share of the drones that fail on the way,
+              evenly over the shapes
     failure : "fall" out of the sky, "hover" where it is and hear nothing more, or "both" in turns
     settings : keys of the scenario, for instance {"wind.gust": 2.0}
 

@@ -245,7 +245,8 @@ def not_finite_message(scenario: Scenario, seed: int, agent: int, step: int) -> 
 def first_bad_step(state: DriverState, low: int, high: int, half: int = 0) -> int:
     """First step after which a state is not finite, by halves.
 
-    state : of a flight that is about to fly the step `low`, is finite there, and is not before the step `high`
+    state : of a flight that is about to fly the step `low`, is finite there, and is not before the
+            step `high`
     half  : as in `State.advance`, for the step `low`
     """
     # Kernels never raise: a test per step would end vector loops. Flights are deterministic, so the
@@ -359,8 +360,8 @@ def open_state(
 ) -> DriverState:
     """State of a flight before its first step.
 
-    start       : as in `fly_world`; given_start : whether agents have been given their places already, so that none are
-                  drawn
+    start       : as in `fly_world`; given_start : whether agents have been given their places
+                  already, so that none are drawn
     absence     : as in `plan_of`
     device      : cpu, or python, in double precision and with all pairs
     observe     : as in `Plan`

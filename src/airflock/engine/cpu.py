@@ -20,7 +20,8 @@ class DriverResult:
 
     values : order parameters combined over time, and the time to each goal (a list, s; nan: never)
     frames : (time, component, agent) or None
-    state  : (component, agent) position and velocity at the end; status : 0, or minus the agent that found no room
+    state  : (component, agent) position and velocity at the end; status : 0, or minus the agent
+             that found no room
     absent : of each agent whether it is absent at the end; None where nobody can be
     """
 
@@ -55,8 +56,8 @@ def fly_steps(
 ) -> tuple[int, NDArray[Any] | None]:
     """Fly the steps first to last - 1 in parts of about BEAT, between which an interruption is heard.
 
-    Returns the next step, or minus the first agent (from 1) that found no place; and, if they are to be recorded, the
-    samples of these steps: (sample, component, agent).
+    Returns the next step, or minus the first agent (from 1) that found no place; and, if they are
+    to be recorded, the samples of these steps: (sample, component, agent).
     """
     steps, step, every = max(1, FIRST // state.agents), first, state.whole("sample_every")
     # Samples from `first` on and before `last`: both ends are rounded up, so that no cut of a

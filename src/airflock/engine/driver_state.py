@@ -35,7 +35,8 @@ class DriverState:
     """Memory of one flight, and the driver that reads and writes it, step by step.
 
     plan, driver : what is fixed at compile time, and the functions that were made of it
-    tables       : what stands in the world and does not change; numbers that may change were copied from it
+    tables       : what stands in the world and does not change; numbers that may change were copied
+                   from it
     arrays       : everything that is carried from step to step, by name; views into `buffer`
     agents       : number of agents
     """
@@ -245,7 +246,8 @@ class DriverState:
     ) -> "DriverState":
         """State before the first step of a scenario by its plan.
 
-        start  : positions and velocities, (component, agent) in m and m/s, where the plan asks for them
+        start  : positions and velocities, (component, agent) in m and m/s, where the plan asks for
+                 them
         device : cpu, or python, uncompiled
         """
         return cls(plan, world_tables(scenario, plan, seed, world), driver_of(plan, device), start)

@@ -62,8 +62,10 @@ def load_loops(
     """Compile loops of a caller around the driver of a plan: the loops are kept with it, and no step is called from
     Python.
 
-    inner     : plain functions that the loops call, such as an `advance` of their own where there is no plan
-    outer     : plain functions that Python calls; they may call `advance` with the arguments of a `DriverState`
+    inner     : plain functions that the loops call, such as an `advance` of their own where there
+                is no plan
+    outer     : plain functions that Python calls; they may call `advance` with the arguments of a
+                `DriverState`
     constants : numbers that both name
     """
     # The driver is compiled as a part of the loops, and not kept by itself: its own lock is theirs.

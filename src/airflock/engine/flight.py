@@ -74,11 +74,14 @@ class Window:
 class Percepts(NamedTuple):
     """What all agents have measured and heard at a decision, by number; parts of one table, (agent, column).
 
-    velocity : own, as measured, m/s, (agent, axis); goal : offset to it, m, (agent, axis), no axes without goals
-    free     : free way along each ray, at most 100 m, evenly around from east on, in space then up and down
-    offset, closing : to the nearest that it hears and meets, m, and their velocities beside its own, m/s, nearest
-                      first, (agent, neighbour, axis)
-    age, heard      : how old that is, s, and 1; all four are 0 where it hears fewer, (agent, neighbour)
+    velocity : own, as measured, m/s, (agent, axis); goal : offset to it, m, (agent, axis), no axes
+               without goals
+    free     : free way along each ray, at most 100 m, evenly around from east on, in space then up
+               and down
+    offset, closing : to the nearest that it hears and meets, m, and their velocities beside its
+                      own, m/s, nearest first, (agent, neighbour, axis)
+    age, heard      : how old that is, s, and 1; all four are 0 where it hears fewer, (agent,
+                      neighbour)
     """
 
     velocity: NDArray[Any]
@@ -1153,12 +1156,14 @@ class Flights:
 
     `open_many` opens them.
 
-    commands   : of all agents, as their laws have decided, (flight, agent, axis): what is written there is flown
-    percepts   : what they decided from (`Percepts`), the same arrays all along: (flight, agent, ...)
+    commands   : of all agents, as their laws have decided, (flight, agent, axis): what is written
+                 there is flown
+    percepts   : what they decided from (`Percepts`), the same arrays all along: (flight, agent,
+                 ...)
     over       : whether each flight has ended, (flight,)
 
-    What is commanded is not noted, unlike that of `airflock.open`. Faults of commands, and the rule of silence, act on
-    it as on a law's.
+    What is commanded is not noted, unlike that of `airflock.open`. Faults of commands, and the rule
+    of silence, act on it as on a law's.
     """
 
     def __init__(

@@ -115,7 +115,8 @@ PLAIN: Mapping[str, Any] = {
 def flight_driver(plan: Plan, exact: bool = False) -> ModuleType:
     """Interpreted driver of a plan, the same whether samples are kept.
 
-    exact : run every line of the text; else rules are not asked about neighbours that do not count (out of range, lost,
+    exact : run every line of the text; else rules are not asked about neighbours that do not count
+            (out of range, lost,
         the agent itself), which a compiled driver asks about and then drops what they say
     """
     return _flight_driver(plan.built(record=False) if plan.record else plan, exact)

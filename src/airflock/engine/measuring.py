@@ -40,8 +40,9 @@ def measure_frames(
     """Score frames (time, component, agent), period s apart: values over all time, and of every instant by name.
 
     every   : instants from sample to sample, and from one look at collisions to the next
-    present : (time, agent), whether an agent is there at all; by default all are. An instant counts with those who are
-              there, one with fewer than two of several does not (nan); what a metric remembers of an agent waits for it
+    present : (time, agent), whether an agent is there at all; by default all are. An instant counts
+              with those who are there, one with fewer than two of several does not (nan); what a
+              metric remembers of an agent waits for it
     """
     plan = plan_of(scenario, precision=precision)
     steps = {"sample_every": every[0], "collide_every": every[1]}

@@ -66,10 +66,12 @@ class Plan:
 
     It is made by `plan_of` alone; `built` gives the same flight with another driver.
 
-    numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
+    numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in
+                order
     surfaces  : surface function of each family of walls, in the order of the faces table
     dryden    : gusts are those of the Dryden spectrum
-    polygon   : the arena is a polygon, whose edges are walls; raised: the middle of its heights is not 0
+    polygon   : the arena is a polygon, whose edges are walls; raised: the middle of its heights is
+                not 0
     obstacle  : surface function of an obstacle
     excursion : how far outside a position is
     ray       : free distance along a direction
@@ -78,31 +80,40 @@ class Plan:
     noisy     : it errs
     edge      : what happens to a coordinate beyond the arena's faces, if anything
     start     : region in which agents start
-    scene     : something stands in the world that agents see with rays, feel, or must not touch; spheres: among it
+    scene     : something stands in the world that agents see with rays, feel, or must not touch;
+                spheres: among it
     goals     : the flock has goals; herd: the goal is a shepherd
     own       : each agent has a goal of its own
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     aero_choices : those of drag descent, where it is added to the model
-    radio     : which packets arrive; radio_choices its compile-time constants. lossy: some are lost by radio.loss
+    radio     : which packets arrive; radio_choices its compile-time constants. lossy: some are lost
+                by radio.loss
     few       : each of its rates sends at most `core.radio.FEW` packets in a decision
     silent    : an agent stops while a neighbour that it has lost could be near
     sequential: one agent after another perceives, decides and moves
     lags      : commands wait for body.delay before the body follows them
     faults    : kinds of fault that may occur
     varied    : numbers that differ among agents, as (letter, name); each is a row
-    topology  : which of the agents that it hears an agent meets; None: all. fading: signals differ by chance
-    laws      : laws of groups, beside `model`; the numbers of the first have the letter p1, and so on
-    law       : which of all laws the stages are made for that ask one: 0 is `model`; None where there is no other
+    topology  : which of the agents that it hears an agent meets; None: all. fading: signals differ
+                by chance
+    laws      : laws of groups, beside `model`; the numbers of the first have the letter p1, and so
+                on
+    law       : which of all laws the stages are made for that ask one: 0 is `model`; None where
+                there is no other
     grouped   : a rule asks for the groups of agents
-    own_text  : state of the text of rules that are no part of the package: no driver outlives a change of them
+    own_text  : state of the text of rules that are no part of the package: no driver outlives a
+                change of them
     bits      : 32 or 64 per number
     record    : keep every sample (position, velocity, command) besides the running sums
     given_start : the flight starts from positions and velocities that are handed over
     grid      : neighbours by cells, all cores for one flock; else all pairs, one core
-    near      : with `grid`: order parameters look at pairs and links by cells, too, where their rules allow it
-    absence   : agents may be absent: they lie behind those who are there (`engine.absence_and_faults`)
-    observe   : how many of the nearest that it hears each agent keeps as rows, and rays around it (`stages.observe`)
+    near      : with `grid`: order parameters look at pairs and links by cells, too, where their
+                rules allow it
+    absence   : agents may be absent: they lie behind those who are there
+                (`engine.absence_and_faults`)
+    observe   : how many of the nearest that it hears each agent keeps as rows, and rays around it
+                (`stages.observe`)
     """
 
     model: Model
@@ -452,10 +463,13 @@ def plan_of(
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
-    grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
-    near        : where neighbours are found by cells, order parameters go by cells, too; by default in large flocks
+    grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box
+                  too small for cells
+    near        : where neighbours are found by cells, order parameters go by cells, too; by default
+                  in large flocks
     given_start : the start is handed over with each flight
-    absence     : agents may be absent; where a fault takes agents out, or empty batteries do, they may in any case
+    absence     : agents may be absent; where a fault takes agents out, or empty batteries do, they
+                  may in any case
     """
     check_precision(precision)
     own_text = _own_text(scenario, metrics)

@@ -44,7 +44,8 @@ def compiler_fingerprint() -> str:
 def load_driver(text: str, label: str, *, by_process: bool = True) -> ModuleType:
     """Import a driver from its text; compiled code of an earlier process is reused.
 
-    by_process : where plain Numba compiles, it does so in a process of its own, and this one loads the code
+    by_process : where plain Numba compiles, it does so in a process of its own, and this one loads
+                 the code
     """
     _import_compiler()
     # Numba's own cache looks at the time stamp of one file and would serve stale physics when a

@@ -23,8 +23,8 @@ class WorldTables:
     row   : (columns,) all records of numbers in the plan's order, SI
     whole : (len(WHOLE),) integers
     faces : (face, 4) numbers of each surface, families one after another
-    edges : (edge, 4) ax ay bx by of polygons, m: the arena's first, then the obstacles', with heights behind them where
-            there are any (`world.place.edge_rows`)
+    edges : (edge, 4) ax ay bx by of polygons, m: the arena's first, then the obstacles', with
+            heights behind them where there are any (`world.place.edge_rows`)
     spans : (obstacle, 2) first and last edge of each obstacle
     shapes, nodes, links : what stands in the scene, as in `world.scenes.tree`
     later : (shape, 8) bounds (m), time (s) and number of each shape that appears while flying

@@ -19,7 +19,8 @@ from airflock.world import arena, inward_plane
 def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tuple[Any, Any]]:
     """Return the numbers of law and body of each of the first `count` agents.
 
-    seed : of the tolerances of manufacture; None: without tolerances, for real drones have their own
+    seed : of the tolerances of manufacture; None: without tolerances, for real drones have their
+           own
 
     Raises ScenarioError where groups have fewer agents.
     """
@@ -64,14 +65,17 @@ def make_card_document(
 ) -> dict[str, Any]:  # fmt: skip
     """Return the document of a flight card, without its hash.
 
-    site          : latitude and longitude (degrees), altitude (m) of the arena's centre on the ground
+    site          : latitude and longitude (degrees), altitude (m) of the arena's centre on the
+                    ground
     height        : of the flock, m above the site; in space, of the arena's centre
     margin        : of the fence around the law's walls, m
-    as_simulated  : use neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
-    seed          : of the tolerances of manufacture that groups have; None: real drones bring their own
+    as_simulated  : use neighbours' data as the scenario's radio does; else they are carried forward
+                    and kept for 5 s
+    seed          : of the tolerances of manufacture that groups have; None: real drones bring their
+                    own
     safety        : limits that differ from those that follow from the scenario
-    stop_for_lost : whether the rule of silence stops a drone, whatever the scenario says; None: it does, and with
-                    as_simulated only where the scenario says so
+    stop_for_lost : whether the rule of silence stops a drone, whatever the scenario says; None: it
+                    does, and with as_simulated only where the scenario says so
 
     Raises CardError where the scenario has no walls, where neighbours are seen instead of heard, or
     where its law or its topology is not in the package.

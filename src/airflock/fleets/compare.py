@@ -30,7 +30,8 @@ def software_card(
 ) -> FlightCard:  # fmt: skip
     """Make the card of a fleet in software: one tick and one packet per decision, as in the simulation.
 
-    realtime      : on the real clock: ticks and packets as often as on real drones, neighbours carried forward
+    realtime      : on the real clock: ticks and packets as often as on real drones, neighbours
+                    carried forward
     stop_for_lost : whether the rule of silence stops a drone; by default where the scenario says so
     seed          : of the tolerances of manufacture that groups have
     """

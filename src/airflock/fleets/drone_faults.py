@@ -164,8 +164,8 @@ class DroneFaults:
     def begin_due(self, step: int, state_and_command: Callable[[int], tuple[State, Velocity]] | None = None) -> None:
         """Begin the faults that are due before a motion step.
 
-        state_and_command : function from a drone to its true state (m, m/s) and its last motor command (m/s); None:
-                            no rule needs them
+        state_and_command : function from a drone to its true state (m, m/s) and its last motor
+                            command (m/s); None: no rule needs them
         """
         while self._onsets and self._onsets[0].step <= step:
             onset = self._onsets.pop(0)

@@ -66,7 +66,8 @@ class TelemetryBroadcast:
 
         now           : time of the flight, s
         utc           : µs of Unix time
-        active_faults : kinds of fault of the scenario that hold, each with the indices of the affected drones
+        active_faults : kinds of fault of the scenario that hold, each with the indices of the
+                        affected drones
         """
         if now < self._next_report:
             return []

@@ -50,9 +50,12 @@ class FleetRuns:
     vehicle    : the autopilot that the vehicles imitated
     measured   : order parameters of each flight
     simulated  : those of the simulator beside it, if requested
-    runs       : report of each flight: seed, digest, phases, notes, order parameters; on the real clock its load
-    recordings : of each flight (time, space, keypoint, individual), position m and velocity m/s, where they are kept
-    divergence : distance (m) between the first flight and the simulated one over time, where both have the same start
+    runs       : report of each flight: seed, digest, phases, notes, order parameters; on the real
+                 clock its load
+    recordings : of each flight (time, space, keypoint, individual), position m and velocity m/s,
+                 where they are kept
+    divergence : distance (m) between the first flight and the simulated one over time, where both
+                 have the same start
     """
 
     scenario: Scenario

@@ -208,8 +208,8 @@ HEARD_SINCE = -1e8  # s; a peer whose last state held before this has not been h
 class FlownFleet:
     """A fleet that has flown, with what was recorded of it once a period.
 
-    frames      : (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node; nan
-                  once a drone has dropped out, as in the recording of a simulation
+    frames      : (time, agent, 15): true position and velocity, setpoint, own position and velocity
+                  of the node; nan once a drone has dropped out, as in the recording of a simulation
     state_times : (time, receiver, sender): time of the last state that a node has of another one, s
     log         : time (s), member and text of each note
     """
@@ -245,7 +245,8 @@ class LockstepFleet(FlownFleet):
 
     scenario : body, sensors, radio and motion step of the simulated world
     card     : card of all nodes
-    start    : state of each drone in the air, from which all flock at once; None: from the ground, by orders
+    start    : state of each drone in the air, from which all flock at once; None: from the ground,
+               by orders
     operator : private key of the operator, for orders from the ground
     """
 

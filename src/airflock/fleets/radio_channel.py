@@ -119,7 +119,8 @@ class RadioChannel:
     members     : system ids
     period      : s between two packets of a drone
     radio_range : range (m) that faults leave between two drones, by their indices, at a time (s)
-    is_clear    : returns True if no obstacle stands between two positions, m; None: there are no obstacles
+    is_clear    : returns True if no obstacle stands between two positions, m; None: there are no
+                  obstacles
     site        : of the flight, for positions in forged packets
     """
 

@@ -97,8 +97,8 @@ class RealtimePlan:
     """Data that all tasks of a fleet share.
 
     start   : states of drones that begin in the air; None: on the ground
-    clock   : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it has heard its
-              vehicle; shared memory
+    clock   : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it
+              has heard its vehicle; shared memory
     seen    : position (m) of each vehicle and whether it is armed, four numbers; shared memory
     epoch   : Unix time at which time.monotonic was 0, µs
     watcher : address that gets all packets and the reports of the channel; None: no such address
@@ -148,7 +148,8 @@ class RealtimePlan:
 class TaskResult(NamedTuple):
     """Result of one node or vehicle.
 
-    rows      : one per period: true state of a vehicle; command, own state and times of peers' states of a node
+    rows      : one per period: true state of a vehicle; command, own state and times of peers'
+                states of a node
     notes     : time.monotonic (s), member and text
     ticks     : ticks of a node, looks of a vehicle
     processor : processor time, s
@@ -359,7 +360,8 @@ class ComputerLoad(NamedTuple):
     cores             : processor time of all per second
     nodes, vehicles   : of these (with the channel), where they are processes
     ticks, late, worst: of all nodes: total, late by more than half a period, largest delay (s)
-    others            : load of this computer (processes that want a processor, one minute) at the end of the flight
+    others            : load of this computer (processes that want a processor, one minute) at the
+                        end of the flight
     """
 
     cores: float
@@ -427,7 +429,8 @@ def fly_in_realtime(
     start        : states in the air; None: from the ground by orders of the operator, and back
     first_client : address at which vehicle 1 calls a client; vehicle 2 calls at the next port
     on_done      : called once for each second flown
-    watcher      : address that gets every packet and the reports of the channel (`TelemetryBroadcast`)
+    watcher      : address that gets every packet and the reports of the channel
+                   (`TelemetryBroadcast`)
 
     Raises ScenarioError for faults that need lock-step, LinkError where a process ends before its
     time.

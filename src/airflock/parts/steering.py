@@ -1,9 +1,10 @@
 """Steering: a law's command as the command that another kind of body takes.
 
-Every conversion goes by the velocity that the law wants. A heading wants the preferred speed along it; an acceleration
-wants the own velocity plus what it adds in the time in which the body answers, so that a body that lags by that time
-accelerates as the law asks for. A body that takes a heading flies along the wanted velocity; one that takes an
-acceleration gets what closes the gap in that time. Ours; an ideal body makes of it the law's own integration.
+Every conversion goes by the velocity that the law wants. A heading wants the preferred speed along
+it; an acceleration wants the own velocity plus what it adds in the time in which the body answers,
+so that a body that lags by that time accelerates as the law asks for. A body that takes a heading
+flies along the wanted velocity; one that takes an acceleration gets what closes the gap in that
+time. Ours; an ideal body makes of it the law's own integration.
 """
 
 from collections.abc import Callable, Mapping

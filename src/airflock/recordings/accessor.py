@@ -1,7 +1,7 @@
 """The accessor `recording.flock` of xarray: scores, measures, pictures and replays of a dataset in one line.
 
-Importing the layout of recordings registers it. It imports what it calls only when it is called, so that this costs a
-flight nothing; pictures come from a room above this one, by the public names.
+Importing the layout of recordings registers it. It imports what it calls only when it is called, so
+that this costs a flight nothing; pictures come from a room above this one, by the public names.
 """
 
 from collections.abc import Callable

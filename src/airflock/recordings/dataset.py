@@ -39,7 +39,8 @@ def make_dataset(
 
     times   : time of each frame, or the constant time between two, s
     command : what the model commands: velocity (m/s), acceleration (m/s²) or heading
-    groups  : name of each agent's group, "" in none, as the coordinate `group`; none where there are no groups
+    groups  : name of each agent's group, "" in none, as the coordinate `group`; none where there
+              are no groups
     """
     count, _, agents = frames.shape
     if isinstance(times, np.ndarray):

@@ -9,7 +9,8 @@ CONFIDENCE = 0.95
 def upper_probability_bound(events: int, flights: int, confidence: float = CONFIDENCE) -> float:
     """Return the largest probability per flight that so few events allow (Clopper and Pearson 1934, one-sided).
 
-    events : flights in which it happened, out of `flights`. Returns 0 to 1; for no event 1 - (1 - confidence)^(1/n).
+    events : flights in which it happened, out of `flights`. Returns 0 to 1; for no event 1 - (1 -
+             confidence)^(1/n).
     """
     from scipy.special import betaincinv  # not on top, nor scipy.stats: the first table of a flight waits for imports
 

@@ -112,7 +112,8 @@ class ReaderProcess:
     ):  # fmt: skip
         """Start the process.
 
-        read  : runs there, on the path, the bytes that all arrays may take, and a function that reports the share read
+        read  : runs there, on the path, the bytes that all arrays may take, and a function that
+                reports the share read
         kind  : of file, for messages; pace : bytes of it that are read in a second
         limit : s of a processor, by default 15 s and what the file takes at its pace
 

@@ -119,7 +119,8 @@ def replay_recording(
     """Fly a simulated recording again from its attributes.
 
     law, settings, trust : as of `scenario_to_fly_again`
-    Returns whether all positions have the same bits, and what differs between then and now that could explain it.
+    Returns whether all positions have the same bits, and what differs between then and now that
+    could explain it.
     """
     scenario = scenario_to_fly_again(recording, law, settings, trust=trust)
     seed = attributes.read_integer(recording, "airflock_seed")
@@ -142,8 +143,10 @@ def scenario_to_fly_again(
 ) -> Scenario:
     """Return the scenario that a simulated recording was flown with, or raise RecordingError for what it lacks.
 
-    law      : where it was flown with a law of the user's own, that law (a module, a mapping, a Model, or its file)
-    settings : where it was flown with a body, metrics, ... of the user's own, their files: {"metrics.kind": "mine.py"}
+    law      : where it was flown with a law of the user's own, that law (a module, a mapping, a
+               Model, or its file)
+    settings : where it was flown with a body, metrics, ... of the user's own, their files:
+               {"metrics.kind": "mine.py"}
     trust    : whether these files may run
     """
     document = attributes.scenario_document(recording)

@@ -206,7 +206,8 @@ def check_keep(keep: Sequence[str], events: Sequence[Any], scenario: Scenario) -
 def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable]:
     """Fly to the end and return what was perceived, as variables of the recording.
 
-    measured_position (m), measured_velocity (m/s) : (time, space, keypoint, individual), as last measured
+    measured_position (m), measured_velocity (m/s) : (time, space, keypoint, individual), as last
+    measured
     age : (time, receiver, sender), s since what was last heard had been sent; nan: never heard
     """
     scenario, n = flight.scenario, flight.agents

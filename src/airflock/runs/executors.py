@@ -59,7 +59,8 @@ class RunProgress:
     """Progress of a run.
 
     stage, text : what is under way, and a few words on it
-    done, total : flights of the stage, those of the store included; total is None where it is not known
+    done, total : flights of the stage, those of the store included; total is None where it is not
+                  known
     fresh       : flights of the stage that this process has flown
     """
 
@@ -302,8 +303,10 @@ def score_scenarios(
 ) -> list[dict[str, Any]]:
     """Return the order parameters of flight i of scenarios[i] with seeds[i].
 
-    scheduler : address of a dask scheduler whose workers fly; None: this process, with so many threads on a device
-    Raises FlightError for a flight that goes wrong, StudyError for a scheduler that does not answer.
+    scheduler : address of a dask scheduler whose workers fly; None: this process, with so many
+                threads on a device
+    Raises FlightError for a flight that goes wrong, StudyError for a scheduler that does not
+    answer.
     """
     from airflock.engine import pick_device, score_flights
 

@@ -1,7 +1,7 @@
 """The folder of a run: its request, every flight as it lands, its result; begun or continued.
 
-A run is a study, a campaign of a certificate, a tuning, a hardening or a sweep. `request.toml` is written once, before
-anything flies, and compared with what a later call requests.
+A run is a study, a campaign of a certificate, a tuning, a hardening or a sweep. `request.toml` is
+written once, before anything flies, and compared with what a later call requests.
 """
 
 import hashlib
@@ -63,7 +63,8 @@ def read_request(folder: Path, kind: str, *, resume: bool | None = None) -> dict
     """Return the request in a folder, None if it holds none.
 
     resume : as `open_folder` takes it
-    Raises StudyError for a run of another kind, and for a folder that may not be begun or continued.
+    Raises StudyError for a run of another kind, and for a folder that may not be begun or
+    continued.
     """
     held = _request(folder, kind)
     if held is not None and resume is False:
@@ -115,7 +116,8 @@ def open_folder(folder: Path, work: Work, *, resume: bool | None = None, also: M
     """Make the folder of a run, or check that it holds this very run.
 
     resume : False refuses a folder that holds it already, True a new one; None begins or continues
-    also   : options of this call that decide what is done besides; kept in the request, but not compared
+    also   : options of this call that decide what is done besides; kept in the request, but not
+             compared
 
     A fitness of the user's own may have been mended since: flights that are stored are judged by
     it. Returns a note of that, or "". Raises StudyError where the folder holds something else.

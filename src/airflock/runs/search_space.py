@@ -26,7 +26,8 @@ class SearchAxis:
 
     key       : for instance model.p_rep
     unit      : of low and high, both included
-    scale     : "linear" or "log": even steps of a point are even differences or even ratios of the value
+    scale     : "linear" or "log": even steps of a point are even differences or even ratios of the
+                value
     integer   : only whole numbers
     above     : key of a parameter that this one never lies below
     """

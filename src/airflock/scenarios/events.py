@@ -18,9 +18,9 @@ from airflock.support import FlightError, ParameterError
 class Event:
     """A change to a flight before it flew `step`.
 
-    kind : change (keys of the scenario), command (of agents, instead of their law's), push (of agents, m/s),
-           place (of agents, m), fault (of some agents), remove (an agent drops out), add (one that was absent
-           joins), or branch (another world's random numbers)
+    kind : change (keys of the scenario), command (of agents, instead of their law's), push (of
+           agents, m/s), place (of agents, m), fault (of some agents), remove (an agent drops out),
+           add (one that was absent joins), or branch (another world's random numbers)
     data : plain values, as the method of `Flight` of the same name takes them
     """
 

@@ -65,7 +65,8 @@ def presets() -> dict[str, Path]:
 def files_of_laws(folder: str) -> Mapping[str, Path]:
     """Return name → file of what the laws of the package bring in a folder: "presets" or "studies".
 
-    The name is LAW/FILE; one in a folder within is named by that, as a publication that flies another's law.
+    The name is LAW/FILE; one in a folder within is named by that, as a publication that flies
+    another's law.
     """
     found = {}
     for path in Path(str(resources.files("airflock.parts.laws"))).glob(f"*/{folder}/**/*.toml"):

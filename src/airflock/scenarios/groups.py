@@ -35,8 +35,10 @@ class Group:
 
     agents  : their numbers, in order
     numbers : (letter, name) → value in place of the flock's
-    spread  : (letter, name) → standard deviation of the agents' values about it, absolute or a share of the value
-    law     : model and parameters, if the group flies by another law, or by the flock's law with other choices
+    spread  : (letter, name) → standard deviation of the agents' values about it, absolute or a
+              share of the value
+    law     : model and parameters, if the group flies by another law, or by the flock's law with
+              other choices
     """
 
     name: str
@@ -54,7 +56,8 @@ class Group:
 class FlownLaw(NamedTuple):
     """A law that agents of a flock fly by.
 
-    parameters : its record; numbers that differ among its agents are those of the first group that flies by it
+    parameters : its record; numbers that differ among its agents are those of the first group that
+                 flies by it
     agents     : numbers of the agents that fly by it
     varied     : its numbers that differ among them, as ("p", name)
     """
@@ -78,7 +81,8 @@ class GroupLawReader:
     model, kind, parameters : law of the flock, as its file names it, and its numbers
     own    : laws that the caller gives, by name
     folder : of the scenario file; trust : True if a file of the user's own may run
-    walls  : True if the world has polygons, which are shapes for a law that casts rays and surfaces for any other
+    walls  : True if the world has polygons, which are shapes for a law that casts rays and surfaces
+             for any other
     """
 
     model: Model
@@ -334,7 +338,8 @@ def _read_numbers(of: str, section: str, table: Any, record: type, group: Group,
 def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return the numbers that differ among agents, as (letter, name), in declared order.
 
-    base : letter → record of those that are in no group; a group with a law of its own has the numbers of that
+    base : letter → record of those that are in no group; a group with a law of its own has the
+           numbers of that
     """
     names = []
     for letter, record in base.items() if groups else ():

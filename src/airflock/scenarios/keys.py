@@ -41,9 +41,11 @@ SHARING = {kind.section: kind for kind in (RADIOS, TOPOLOGIES, SETS)}  # whose m
 class Key(NamedTuple):
     """One key of a scenario file.
 
-    name    : as it is written after --set, for instance "radio.delay"; keys of an entry of [[faults]] or [[groups]]
+    name    : as it is written after --set, for instance "radio.delay"; keys of an entry of
+              [[faults]] or [[groups]]
         follow the name of the list
-    of      : the model, body, sensor, radio or kind of fault that the key belongs to; "" where it is always there
+    of      : the model, body, sensor, radio or kind of fault that the key belongs to; "" where it
+              is always there
     kind    : "number", "choice", "points", "text", "list" or "table"
     default : None means "derived from the rest of the scenario", or that there is none
     unit    : SI unit; "1" for a plain number, "" for a key without one

@@ -73,7 +73,8 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
 
     where : key and value that name it, for errors
     trust : True if the caller consents to running it
-    Raises ScenarioError without consent or without the file, and RuleError for exceptions of its import.
+    Raises ScenarioError without consent or without the file, and RuleError for exceptions of its
+    import.
     """
     if not is_file(path):
         raise ScenarioError([f"{where}: no such file"])

@@ -487,7 +487,8 @@ MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
 def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...], cells: bool) -> list[str]:
     """Note the cost of order parameters over all pairs in a large flock.
 
-    cells : True if neighbours are found by cells. Then order parameters look at pairs by cells if all of a clock are
+    cells : True if neighbours are found by cells. Then order parameters look at pairs by cells if
+            all of a clock are
         `settled`, and at links if they have a largest length of links
     """
     # Metrics of one clock are summed in one pass over pairs: one that needs all pairs makes the

@@ -282,8 +282,8 @@ def formation_errors(world: arena.Parameters, start_record: start.Parameters, ag
 def _outermost(plan: Any, place: FormationPlace, spacing: tuple[float, float, float], agents: int) -> list[int]:
     """Return agents of a formation of which one is outside a ground plan wherever any is.
 
-    Every other agent stands on one line. Its ends are returned, and those beside each place where it crosses an edge:
-    between two such places all are inside, or none.
+    Every other agent stands on one line. Its ends are returned, and those beside each place where
+    it crosses an edge: between two such places all are inside, or none.
     """
     # Not each agent in turn: ten million that fit took minutes.
     numbers = set()

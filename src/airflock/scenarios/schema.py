@@ -1,8 +1,9 @@
 """Tables of a scenario: each key is looked up, converted and checked in one pass, and all errors are collected.
 
-People's units become the declared SI units, and a note reports each conversion: a value may carry its unit as text,
-`delay = "400 ms"`, or as a table, `delay = { value = 400, unit = "ms" }`. A spread is the standard deviation of a
-manufacturing tolerance, in the unit of its number or as a share of it.
+People's units become the declared SI units, and a note reports each conversion: a value may carry
+its unit as text, `delay = "400 ms"`, or as a table, `delay = { value = 400, unit = "ms" }`. A
+spread is the standard deviation of a manufacturing tolerance, in the unit of its number or as a
+share of it.
 
 The declarations of the parameters are the schema. Each error is one line: file, key, value, unit,
 allowed range, and the nearest right key for a wrong one.
@@ -166,7 +167,8 @@ def unit_names(declared: str) -> set[str]:
 def converted(name: str, entry: Any, declared: Declaration) -> tuple[Any, str, str]:
     """Convert one value to its declared unit; return it, as text or in a table as it was, with a note and an error.
 
-    The error is of a unit that does not fit, or of text without one; what else is wrong is left as it is.
+    The error is of a unit that does not fit, or of text without one; what else is wrong is left as
+    it is.
     """
     if not isinstance(declared, (Quantity, Points)):
         return entry, "", ""

@@ -39,8 +39,10 @@ class Flight(Record):
 class Geometry(NamedTuple):
     """The numbers that drivers read of world, start and goals, derived at set-up, m and m/s.
 
-    half_*   : half sizes of the arena; extent_*: of the box about the origin from which starts are drawn
-    speed    : at the start; clearance: from the shapes of the scene; wall_clearance: from those, walls and obstacles
+    half_*   : half sizes of the arena; extent_*: of the box about the origin from which starts are
+               drawn
+    speed    : at the start; clearance: from the shapes of the scene; wall_clearance: from those,
+               walls and obstacles
     goal_*   : radius in which a goal counts as reached, speed, spread, distance of a shepherd
     spacing_*, jitter : of a start formation
     """
@@ -76,7 +78,8 @@ class Section(NamedTuple):
     """One section of a scenario.
 
     key     : its table in a scenario file; empty for the keys at the top
-    record  : its parameters; None where the model brings them. Body, sensor, radio and metric set may bring others
+    record  : its parameters; None where the model brings them. Body, sensor, radio and metric set
+              may bring others
     letter  : name of its numbers in rules and drivers; empty where no driver reads any
     driver_record : record that drivers read instead of the section's own
     """

@@ -422,10 +422,11 @@ def run_sensitivity(
 ) -> pd.DataFrame:
     """Measure the effect of each parameter on the first objective over the study's whole space.
 
-    samples : base samples: sobol takes samples · (axes + 2) candidates, samples a power of two; morris
-              samples · (axes + 1), in trajectories
-    Returns one row a parameter. sobol: S1, ST (shares of the variance, alone and with all interactions) and their 95 %
-    half-widths; morris: mu_star (mean absolute effect over the range), its half-width, and sigma (its spread).
+    samples : base samples: sobol takes samples · (axes + 2) candidates, samples a power of two;
+              morris samples · (axes + 1), in trajectories
+    Returns one row a parameter. sobol: S1, ST (shares of the variance, alone and with all
+    interactions) and their 95 % half-widths; morris: mu_star (mean absolute effect over the range),
+    its half-width, and sigma (its spread).
     """
     try:
         from SALib.analyze import morris as analyse_morris, sobol as analyse_sobol

@@ -595,7 +595,8 @@ def finalist_table(
 def _winner(study: Study, rows: Sequence[Sequence[float | None]], excess: NDArray[np.float64] | None = None) -> int:
     """Return the index of the best finalist; with several objectives, of the one nearest to the best of each.
 
-    excess : how far each is from keeping all limits; the one that is nearest wins, of equals the fittest
+    excess : how far each is from keeping all limits; the one that is nearest wins, of equals the
+             fittest
     """
     signs = np.array([1.0 if objective.maximise else -1.0 for objective in study.objectives])
     table = np.array([[np.nan if v is None else v for v in row] for row in rows], float) * signs

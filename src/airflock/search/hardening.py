@@ -52,7 +52,8 @@ S4 = "Table S4"
 class HardeningStep:
     """One change of the recipe: factors on keys, and why.
 
-    braking_lead : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls and obstacles
+    braking_lead : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls
+                   and obstacles
     """
 
     name: str
@@ -81,11 +82,15 @@ WALL_STEPS = tuple(
 class StepResult:
     """Parameters of one step and what they cost and gain against the optimum, over paired seeds.
 
-    fitness, r_min, n_coll : mean over seeds; r_min (m) is the smallest distance of two agents in a flight
-    cost, gain : fitness lost and smallest distance won (m) against the first step: mean, and 95 % interval
+    fitness, r_min, n_coll : mean over seeds; r_min (m) is the smallest distance of two agents in a
+                             flight
+    cost, gain : fitness lost and smallest distance won (m) against the first step: mean, and 95 %
+                 interval
     parts    : mean of each partial fitness
-    contacts : share of flights in which somebody left the arena or entered an obstacle; nan where nobody looked
-    clearance : mean over seeds of the smallest distance to walls and obstacles, m; nan where nobody looked
+    contacts : share of flights in which somebody left the arena or entered an obstacle; nan where
+               nobody looked
+    clearance : mean over seeds of the smallest distance to walls and obstacles, m; nan where nobody
+                looked
     kept     : whether the step stays; verdict: why, or why not
     """
 

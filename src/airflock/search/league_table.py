@@ -1,7 +1,8 @@
 """League: laws × robots × worlds. Each law is tuned by the same search, and judged on the same held-out seeds.
 
-A cell is one law on one robot in one world: a study in a folder of its own, then flights of its winner on seeds that no
-study flies. All laws of a robot in a world fly the same seeds, so that they are compared in pairs.
+A cell is one law on one robot in one world: a study in a folder of its own, then flights of its
+winner on seeds that no study flies. All laws of a robot in a world fly the same seeds, so that they
+are compared in pairs.
 """
 
 import math
@@ -95,8 +96,8 @@ class League:
     """A league as its file says it.
 
     table  : title, version, scenario, held_out, set, robots, worlds and search, as plain values
-    laws   : name of each law → its `file`, if it is no law of the package, and its tables `set` and `space`; a folder
-             may get further laws
+    laws   : name of each law → its `file`, if it is no law of the package, and its tables `set` and
+             `space`; a folder may get further laws
     source : file of a computed league whose rows are taken over, "" for none
     """
 
@@ -169,10 +170,11 @@ def _at_speed(scenario: Scenario, law: str) -> Scenario:
 class LeagueResult:
     """A league that has been flown.
 
-    rows        : one for each cell: law, robot, world; either the reason why it does not flock, or parameters, means
-                  of the order parameters with Student's 95 % intervals, and the fitness of each held-out flight
-    comparisons : one for each two laws that flock on one robot in one world: the mean paired difference of fitness, its
-                  interval, and p, corrected by Holm over all of them
+    rows        : one for each cell: law, robot, world; either the reason why it does not flock, or
+                  parameters, means of the order parameters with Student's 95 % intervals, and the
+                  fitness of each held-out flight
+    comparisons : one for each two laws that flock on one robot in one world: the mean paired
+                  difference of fitness, its interval, and p, corrected by Holm over all of them
     """
 
     folder: Path
@@ -312,7 +314,8 @@ def read_league(
     """Read a league from a file, from the result of one, or (`source` None) from the folder that is resumed.
 
     laws : further ones
-    Raises ScenarioError with one line for each error, StudyError for a file or folder that cannot be read.
+    Raises ScenarioError with one line for each error, StudyError for a file or folder that cannot
+    be read.
     """
     held = None if folder is None else read_request(folder, League.kind)
     before = (held or {}).get("also", {})
@@ -480,7 +483,8 @@ def _interval(values: Sequence[Any]) -> dict[str, float]:
 def compare_laws(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Compare each two laws that flock on one robot in one world, in pairs of held-out flights of one seed.
 
-    Two laws whose difference is the same in all flights are not distinguished: it has no spread to judge it by.
+    Two laws whose difference is the same in all flights are not distinguished: it has no spread to
+    judge it by.
     """
     flying = [row for row in rows if not row["reason"]]
     pairs = [(a, b) for a, b in combinations(flying, 2) if (a["robot"], a["world"]) == (b["robot"], b["world"])]

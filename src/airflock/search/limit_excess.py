@@ -37,7 +37,8 @@ def limit_excess(
 ) -> NDArray[np.float64]:
     """Return how far candidates are from keeping all limits (candidate,): standard deviations, added up.
 
-    flights : of each candidate in the scenario; reserve : how many times rarer than allowed an event has to look
+    flights : of each candidate in the scenario; reserve : how many times rarer than allowed an
+              event has to look
     """
     found = np.zeros(len(flights))
     for limit in limits:

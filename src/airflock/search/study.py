@@ -71,7 +71,8 @@ class Objective:
 
     name       : an order parameter, or the name of a function of the user's own
     maximise   : False where less is better
-    own, text  : a function of the user's own, and a hash of its text; file : that holds it, if it is one
+    own, text  : a function of the user's own, and a hash of its text; file : that holds it, if it
+                 is one
     over_seeds : mean, worst case, or the value that all but a share `quantile` of the flights reach
     """
 
@@ -425,7 +426,8 @@ LAYOUT = 1  # of the study folder; raised whenever an older folder could not be 
 class Study:
     """An optimisation: everything that decides its result.
 
-    others : further scenarios in which each candidate flies; over_scenarios: mean or worst of them all
+    others : further scenarios in which each candidate flies; over_scenarios: mean or worst of them
+             all
     labels : what to call each scenario, the first included
     limits : events and their largest rates; candidates that keep them rank before all others
     """
@@ -586,7 +588,8 @@ def study_of_request(
 ) -> Study:  # fmt: skip
     """Return the study that a folder holds, with what a call that resumes it gives besides.
 
-    given      : the same study as this call names it, if it does; of use where an older folder keeps no names
+    given      : the same study as this call names it, if it does; of use where an older folder
+                 keeps no names
     objectives : in place of those in the folder
     Raises ScenarioError or StudyError where that cannot be searched here.
     """
@@ -633,7 +636,8 @@ def make_study(
     """Make a study from a nested dict; `trust` lets code run that it names.
 
     scenario : in place of its key of that name; or several, in place of `scenarios`
-    limits   : in place of those of its objective; each candidate then flies twice at least, unless `search` has seeds
+    limits   : in place of those of its objective; each candidate then flies twice at least, unless
+               `search` has seeds
     """
     document, errors = formats.to_current_format(document, where), ErrorCollector()
     for key in document:

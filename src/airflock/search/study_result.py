@@ -36,16 +36,19 @@ class EvolveResult:
     """Result of a study: the winner, its score, working ranges and finalists.
 
     parameters : of the winner, by key; scenario : with these parameters
-    fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of the
+    fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of
+                                    the
                  mean; the fitness in the unit of the objective
     largest    : best candidate of the search, luck included, in the same unit of the objective
     origin     : "mean" or "top": what the winner was
-    ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's fitness
+    ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's
+                 fitness
     finalists  : one row each: origin, parameters, fitness on fresh seeds
     failed     : candidates of the search that failed
     reasons    : why flights of the search failed → how many of them
     scenarios  : of several: what each is called → mean, low and high of the winner's fitness in it
-    limits     : what the winner's fresh flights say of each limit: events, flights, estimated and allowed probability
+    limits     : what the winner's fresh flights say of each limit: events, flights, estimated and
+                 allowed probability
     dead_reason : why nothing flies; then no best.toml is written; empty if something flies
     """
 

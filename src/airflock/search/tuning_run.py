@@ -78,7 +78,8 @@ DEFAULT_CONFIDENCE = 0.95
 class BudgetPlan:
     """Numbers of flights of each stage.
 
-    search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of certifying
+    search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of
+             certifying
     rate   : flights per second that the plan was made with
     limits, confidence : of the certificate; a resumed tuning keeps them unless others are given
     """
@@ -94,7 +95,8 @@ class BudgetPlan:
 def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_limits: int = USUAL) -> BudgetPlan:
     """Make a plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
 
-    flights_for_limits : flights that show if the rarest limit is kept: at most so many for each finalist and each step
+    flights_for_limits : flights that show if the rarest limit is kept: at most so many for each
+                         finalist and each step
     Raises StudyError if the budget is too small.
     """
     # Fixed when it begins and kept on resume: the same flights are flown, whatever the machine is
@@ -265,7 +267,8 @@ Paths = Sequence[str | os.PathLike[str]]
 class IdentifiedFleet:
     """A fleet identified from logs: the scenario with its numbers, its file, and a report.
 
-    report : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
+    report : files with their hashes, the law's scenario, numbers with intervals or the reason why
+             not, notes
     """
 
     scenario: Scenario

@@ -73,7 +73,8 @@ def check_access(
     """Return two booleans: whether a request may pass, and whether it came with the token in its address.
 
     path   : with its query; cookies : the header; name : of the cookie that holds the token
-    origin : header with the address of the requesting page, if any; host : header with the address of this page
+    origin : header with the address of the requesting page, if any; host : header with the address
+             of this page
 
     A browser sends the cookie also for pages of other ports of the same machine: they are turned
     away.

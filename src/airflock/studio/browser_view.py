@@ -511,7 +511,8 @@ class Trails:
     ) -> None:
         """Draw the newest piece up to positions (agent, 3), m, in the colours of the agents (agent, 3).
 
-        start_of : where the agents were when the piece began → where it is drawn from, both (agent, 3)
+        start_of : where the agents were when the piece began → where it is drawn from, both (agent,
+                   3)
         """
         done = False
         if self._piece_start is not None and self.shown:

@@ -283,7 +283,8 @@ def _with_nan(values: list[int | None]) -> NDArray[np.float64]:
 class FleetPage(LivePage):
     """Page that listens to a fleet.
 
-    observer : of the fleet; listen : gives the datagrams that have arrived; clock : the own clock of both, s
+    observer : of the fleet; listen : gives the datagrams that have arrived; clock : the own clock
+               of both, s
     """
 
     def __init__(

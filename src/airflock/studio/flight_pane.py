@@ -48,7 +48,8 @@ class FlightSource:
 
     where     : preset, scenario file or recording, which is flown again with its events
     settings  : keys changed from outside
-    law       : a law that flies instead of the file's; trust : whether code that the file names may run
+    law       : a law that flies instead of the file's; trust : whether code that the file names may
+                run
     recording : what `where` holds, if it is a recording
     """
 
@@ -122,7 +123,8 @@ def tuned_toml(
     """Return a preset or scenario file with changed keys; comments, units and sources of the others stay.
 
     given : the scenario of a recording, instead of a file
-    whole : what the scenario consists of with all that it extends, for groups and faults that the file does not write
+    whole : what the scenario consists of with all that it extends, for groups and faults that the
+            file does not write
     """
     path = presets().get(source) or Path(source)
     text = path.read_text(encoding="utf-8") if recorded_document is None else tomlkit.dumps(recorded_document)
@@ -215,8 +217,9 @@ def scenario_controls(
 ) -> dict[str, list[ParameterControl]]:
     """Return controls by section, in the order in which the parameters are declared; empty sections are left out.
 
-    The law's section is sorted into the parts that the law names, "model: repulsion" and so on. Numbers that a group
-    has of its own follow: those that the file names for it, and all of a law of its own.
+    The law's section is sorted into the parts that the law names, "model: repulsion" and so on.
+    Numbers that a group has of its own follow: those that the file names for it, and all of a law
+    of its own.
     usual : spans of sliders by key, as a study of the law has them
 
     A number that is derived from the rest of the scenario (None) gets no control, nor do lists and
@@ -311,8 +314,8 @@ MAX_INTERPRETED_AGENTS = 400  # agents; of more, one interpreted step holds a pa
 class FlightPane:
     """One flight of a source, with a list of its changes, so that they can be undone.
 
-    at_once : fly interpreted while the driver is compiled, until `switch_to_compiled` (a recording, a large flock:
-              compiled)
+    at_once : fly interpreted while the driver is compiled, until `switch_to_compiled` (a recording,
+              a large flock: compiled)
 
     Attributes: preset, the scenario at its start; flight; changed, keys that differ from it with
     their values.

@@ -114,7 +114,8 @@ DRAG_ROWS = ("shared_power_drag", "shared_model_drag")  # where a driver keeps i
 class AgentColouring:
     """Colouring of the agents.
 
-    way : its name, one of `available_colourings`; shown : the last shade, whose key stands on the page
+    way : its name, one of `available_colourings`; shown : the last shade, whose key stands on the
+          page
     """
 
     def __init__(self) -> None:

@@ -112,8 +112,10 @@ class FlightRequest:
     where    : preset, scenario file or recording, which is flown again with its events
     settings : keys changed from outside
     seed     : of the first flight; a recording brings its own
-    law      : a law that flies instead of the file's; trust : whether code that the file names may run
-    against  : what is flown beside it, with the same seed and noise: another preset or file, or keys of this one
+    law      : a law that flies instead of the file's; trust : whether code that the file names may
+               run
+    against  : what is flown beside it, with the same seed and noise: another preset or file, or
+               keys of this one
     at_once  : fly interpreted until the driver is compiled
     """
 
@@ -149,8 +151,8 @@ class Player:
 
     Attributes: sources, where the flights come from; sides, as they fly; hand, which of them the
     controls act on; note, what was done last, for the page; fault, called with everything that was
-    refused; clock, how fast they fly; snapshots, to go back to; is_paused; failure_message, why they
-    stopped, or nothing.
+    refused; clock, how fast they fly; snapshots, to go back to; is_paused; failure_message, why
+    they stopped, or nothing.
     """
 
     def __init__(self, request: FlightRequest):

@@ -21,8 +21,8 @@ def log(line: str) -> None:
 def result_table(title: str, columns: str, rows: Sequence[Sequence[str]], **how: Any) -> "Table":
     """Return a table of texts.
 
-    columns : their heads, separated by "; "; one that begins with ">" is set to the right, with "|" is not broken,
-              with "*" in bold, with "~" in dim letters, with "+" in colour
+    columns : their heads, separated by "; "; one that begins with ">" is set to the right, with "|"
+              is not broken, with "*" in bold, with "~" in dim letters, with "+" in colour
     how     : of all columns, such as no_wrap=True
     """
     from rich import box

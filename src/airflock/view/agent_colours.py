@@ -118,8 +118,8 @@ class AgentColours(NamedTuple):
     """One value of every agent.
 
     name   : what it is
-    kind   : scale, from `low` to `high` in `unit`; turn, shares of a full turn; names, numbers of `names`;
-             marks, whole numbers without an order. Names and marks: -1 for none
+    kind   : scale, from `low` to `high` in `unit`; turn, shares of a full turn; names, numbers of
+             `names`; marks, whole numbers without an order. Names and marks: -1 for none
     values : (agent,)
     note   : text beside the key
     """
@@ -215,7 +215,8 @@ def fault_colours(
 ) -> AgentColours:
     """Colour `count` agents by the fault that is active at a time, s; of several, by the one that began last.
 
-    faults : kind, agent, begin and end, s (None: never); kinds : names in the order of the key, if they are known
+    faults : kind, agent, begin and end, s (None: never); kinds : names in the order of the key, if
+             they are known
     """
     names = tuple(kinds) or tuple(dict.fromkeys(str(fault["kind"]) for fault in faults))
     values = np.full(count, -1)

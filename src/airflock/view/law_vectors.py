@@ -82,7 +82,8 @@ def rays_and_command(
 ) -> tuple[list[CastRay], Any]:
     """Return the rays that an agent casts and the command that it decides on, by its law's own rules.
 
-    place, course : the world and its goals as they are at this time, s; own, heard : states of the agent and of others
+    place, course : the world and its goals as they are at this time, s; own, heard : states of the
+                    agent and of others
     """
     senses = RecordingPercept.of(world, own, time, course.of(agent), (0, 0, agent))
     senses.cast_rays = []

@@ -103,7 +103,8 @@ def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower
 class SmoothedLines:
     """Lines that are smoothed, with every instant faint behind.
 
-    course : order parameters over time, s; smooth : window, s; None for a two-hundredth of the course, 0 for none
+    course : order parameters over time, s; smooth : window, s; None for a two-hundredth of the
+             course, 0 for none
     """
 
     def __init__(self, course: pd.DataFrame, smooth: float | None):

@@ -54,8 +54,9 @@ class PackedPositions(NamedTuple):
     low     : smallest coordinate of each axis, m
     quantum : of each axis, m; positions are kept to half of it
     shape   : frames, axes, agents
-    data    : zlib stream of the low bytes of all differences and then of the high ones; in both, each axis after the
-              other, each agent after the other, frame by frame; then the differences of each row of bytes
+    data    : zlib stream of the low bytes of all differences and then of the high ones; in both,
+              each axis after the other, each agent after the other, frame by frame; then the
+              differences of each row of bytes
     """
 
     low: list[float]
@@ -105,7 +106,8 @@ class ColourLayer(NamedTuple):
     """One value of all agents at all frames.
 
     shade : its name, kind and key, without values
-    bytes : (time, agent): scales from 0 to 254, numbers of names, hues of marks of 255 to a turn; 255 for no value
+    bytes : (time, agent): scales from 0 to 254, numbers of names, hues of marks of 255 to a turn;
+            255 for no value
     """
 
     colours: AgentColours

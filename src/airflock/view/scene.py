@@ -1,6 +1,7 @@
 """What stands in a world and what an agent looks like: the one description that pictures, pages and replays draw.
 
-Solids are triangles, walls and goals lines, all in m, east, north and up; agents are darts along their velocity.
+Solids are triangles, walls and goals lines, all in m, east, north and up; agents are darts along
+their velocity.
 """
 
 from typing import Any, NamedTuple

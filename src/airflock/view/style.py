@@ -70,7 +70,8 @@ def figure_and_panels(
 ) -> tuple[Figure, Any]:  # fmt: skip
     """Return a figure of several panels and its axes (row, column): new, of a size in inches, or in the place of ax.
 
-    The latter is a SubFigure, which draws like any; `root_figure` gives the figure that it is a part of.
+    The latter is a SubFigure, which draws like any; `root_figure` gives the figure that it is a
+    part of.
     shared : sharex, sharey, height_ratios, as `Figure.subplots` takes them
     Raises AirflockError for axes that stand in no grid, so that nothing says where their place is.
     """

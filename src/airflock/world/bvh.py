@@ -1,8 +1,8 @@
 """A scene as a flat tree of bounding boxes: which shapes are near, what a cast meets, and what is nearest.
 
 nodes : rows x0 y0 z0 x1 y1 z1 (m) in the order of a walk that visits a node before what it holds
-links : rows skip, first, last: the node to go on with when this one is not met, and the shapes of a leaf (first = last
-        where it holds nodes)
+links : rows skip, first, last: the node to go on with when this one is not met, and the shapes of a
+        leaf (first = last where it holds nodes)
 No stack is needed: a node that is met is followed by the next row, one that is not by `skip`.
 """
 

@@ -5,7 +5,8 @@ time (s) at which the shape appears, and 1.0 if it is part of a surface that clo
 inside. Numbers of the kinds: box and ground (none: the bounds say all), cylinder (x, y, radius),
 triangle (ax ay az bx by bz cx cy cz), segment (ax ay bx by): the ground plan of a wall without end
 in height, sphere (x y z radius). Distances are exact: signed for the solids (negative within),
-unsigned for triangles and segments. All shapes are convex, so a distance along a straight line is convex too.
+unsigned for triangles and segments. All shapes are convex, so a distance along a straight line is
+convex too.
 """
 
 import math

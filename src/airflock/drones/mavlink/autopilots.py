@@ -3,9 +3,9 @@
 Sources: PX4 user guide, pages Offboard Mode and Parameter Reference, and its module mc_pos_control,
 which hands the velocities of Offboard Mode to its controller as they are: MPC_ACC_HOR and
 MPC_JERK_AUTO shape the modes that plan a path, not this one. What limits it is the tilt, the gain
-of the velocity and MPC_XY_VEL_MAX (defaults of v1.13 to main: 45 deg, 1.8 1/s, 12 m/s). ArduPilot Copter, pages Guided
-Mode, Copter Commands in Guided Mode and Complete Parameter List. Numbers of commands and messages:
-MAVLink common.xml.
+of the velocity and MPC_XY_VEL_MAX (defaults of v1.13 to main: 45 deg, 1.8 1/s, 12 m/s). ArduPilot
+Copter, pages Guided Mode, Copter Commands in Guided Mode and Complete Parameter List. Numbers of
+commands and messages: MAVLink common.xml.
 """
 
 import math
@@ -41,12 +41,14 @@ class ParameterCheck(NamedTuple):
 
     why          : the reason, in a few words
     own          : the safe value is the autopilot's own system id
-    timeout      : time-out (s) during which the drone flies on; `reason` adds the distance of that flight; 0: none
+    timeout      : time-out (s) during which the drone flies on; `reason` adds the distance of that
+                   flight; 0: none
     unsafe_value : a value inside the range that is not safe
     later_names  : its names in later versions of the autopilot
     later_unit   : unit of its value under a later name, in units of `name`
-    limits       : what of the drone's response it limits: accel (m/s²), jerk (m/s³), speed (m/s), tilt (degrees) or
-                   gain (1/s, of the velocity); the card says what is needed, and `scale` is its unit
+    limits       : what of the drone's response it limits: accel (m/s²), jerk (m/s³), speed (m/s),
+                   tilt (degrees) or gain (1/s, of the velocity); the card says what is needed, and
+                   `scale` is its unit
     """
 
     name: str
@@ -122,10 +124,11 @@ class Autopilot:
     ours                   : custom mode in which it obeys velocity setpoints
     land, hold             : custom modes that it enters by itself
     takes_off_by_setpoints : False: it takes off by the command TAKE_OFF once it is armed
-    integers_as_bytes      : PARAM_VALUE holds the bytes of an integer (PX4) instead of a converted float
+    integers_as_bytes      : PARAM_VALUE holds the bytes of an integer (PX4) instead of a converted
+                             float
     parameter_checks       : parameters that are checked before the drone arms
-    battery_parameters     : parameters on which its reports of the battery rest, with the meaning of their values;
-                             no value is wrong by itself, so a person reads them
+    battery_parameters     : parameters on which its reports of the battery rest, with the meaning
+                             of their values; no value is wrong by itself, so a person reads them
     """
 
     name: str

@@ -77,7 +77,8 @@ def stamp_of_time(utc: int) -> int:
 class PacketSigner:
     """Packs and signs the messages of one sender.
 
-    last          : last used stamp, also from before a restart; stamps only grow, and no time is taken from others
+    last          : last used stamp, also from before a restart; stamps only grow, and no time is
+                    taken from others
     recent_stamps : the latest stamps, by which an echo of an own frame is recognised
     """
 
@@ -120,8 +121,8 @@ class PacketReceiver:
     key                  : secret of the mission
     own_id               : own system id, from which nothing is accepted
     senders              : system ids that may send a message, by its number
-    started              : own time at the start, µs of Unix time: older packets are refused, so that a restart
-                           accepts no replay
+    started              : own time at the start, µs of Unix time: older packets are refused, so
+                           that a restart accepts no replay
     last_stamps          : last stamp of each system, kept from before a restart
     max_clock_difference : largest difference between a sender's clock and the own one, s
     """

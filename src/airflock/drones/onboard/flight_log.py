@@ -111,8 +111,8 @@ class LoggedTick(NamedTuple):
     """One tick in a log: line, time of the own clock (s), phase, own state, command (m/s), and stamp of the state.
 
     own   : x, y, z (m), vx, vy, vz (m/s); None where the node did not know its state
-    stamp : arrival of the state (s of the own clock) and the autopilot's time of it since boot (s); None where the
-            autopilot's bytes since the tick before do not hold it
+    stamp : arrival of the state (s of the own clock) and the autopilot's time of it since boot (s);
+            None where the autopilot's bytes since the tick before do not hold it
     """
 
     line: int

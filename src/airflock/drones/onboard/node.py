@@ -78,7 +78,8 @@ class NodeMemory(NamedTuple):
 class NodeOutput(NamedTuple):
     """Output of one tick: bytes for the autopilot, datagrams for each radio, lines for a person to read.
 
-    texts : datagrams for the first radio that bring the lines to whoever watches; drones ignore them
+    texts : datagrams for the first radio that bring the lines to whoever watches; drones ignore
+            them
     """
 
     autopilot: list[bytes]
@@ -96,7 +97,8 @@ class Node:
     now, utc : own clock (s) and Unix time (µs) at the start; both advance together
     memory   : state from before a restart
     radios   : periods (s) at which each radio sends the same packet
-    since    : µs of Unix time; older packets are refused. The default is the start, so that no replay is accepted
+    since    : µs of Unix time; older packets are refused. The default is the start, so that no
+               replay is accepted
     """
 
     def __init__(

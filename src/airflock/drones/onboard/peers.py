@@ -148,7 +148,8 @@ ORDER_REFUSALS = {
 class OperatorOrders:
     """Orders that were taken.
 
-    last_order_time : time at which the last order was given, µs of Unix time; kept over restarts against replays
+    last_order_time : time at which the last order was given, µs of Unix time; kept over restarts
+                      against replays
     held            : HOLD was ordered, or its position jumped: only an order ends it
     needs_resume    : its position jumped, and no RESUME was ordered since
     """
@@ -257,8 +258,10 @@ class AutopilotLink:
     site          : origin of local coordinates
     state         : own position and velocity, local
     state_at      : time at which the state arrived, s; -1e9: never
-    far           : distance (m) from the site of the last position that was refused as too far away; 0: none
-    arrivals      : time at which each stream of STREAM_RATES was heard last, s, by number of its message
+    far           : distance (m) from the site of the last position that was refused as too far
+                    away; 0: none
+    arrivals      : time at which each stream of STREAM_RATES was heard last, s, by number of its
+                    message
     restarts      : number of times that the autopilot seems to have rebooted on the ground
     refused       : number of frames with implausible content
     in_failsafe   : it reports that a failsafe of its own acts
@@ -342,7 +345,8 @@ class AutopilotLink:
     def _boots(self, since_boot: int) -> None:
         """Forget all values if the autopilot has rebooted on the ground, so that they are requested once more.
 
-        since_boot : time since boot in a message, ms; a step back by more than REBOOT_MS means a reboot
+        since_boot : time since boot in a message, ms; a step back by more than REBOOT_MS means a
+                     reboot
         """
         goes_on = since_boot >= self._boot_ms - REBOOT_MS
         if self._is_reboot_assumed:

@@ -32,7 +32,8 @@ def limit_velocity(
     """Return the velocity nearest to the wanted one that respects all limits.
 
     own      : state as measured
-    surfaces : distance (m, negative beyond) and inward unit normal of the fence's sides and of obstacles
+    surfaces : distance (m, negative beyond) and inward unit normal of the fence's sides and of
+               obstacles
     heights  : lowest and highest, m
     """
     # The limiter trusts nobody, laws included: nan would pass every comparison below.

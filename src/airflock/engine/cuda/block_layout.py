@@ -21,8 +21,9 @@ class BlockLayout:
     lanes     : agents that the shared tables hold, a multiple of 32
     per_agent : threads that share the pair loop of one agent, a power of two up to 32
     threads   : of the block
-    registers : each thread keeps the state of its agent in registers, else all states lie in a table, and an agent has
-                one thread, or the whole block: others would come to their sums in different turns, and wait for ever
+    registers : each thread keeps the state of its agent in registers, else all states lie in a
+                table, and an agent has one thread, or the whole block: others would come to their
+                sums in different turns, and wait for ever
     crowded   : flocks fill the GPU many times over
     simulated : text for Numba's CUDA simulator, which knows neither shuffles nor alignment
     """
@@ -75,8 +76,8 @@ def block_layout(
 
     sequential  : one agent after another
     whole_flock : some rule solves for the whole flock, which one thread does
-    apart       : agents fly by several laws, where threads of one warp part, so that none hands another a sum; or each
-                  ranks the agents that it hears, which one thread does
+    apart       : agents fly by several laws, where threads of one warp part, so that none hands
+                  another a sum; or each ranks the agents that it hears, which one thread does
     """
     lanes = -(-agents // WARP) * WARP
     if sequential:  # one agent after another: a warp shares its pairs

@@ -3,8 +3,8 @@
 The passes of `engine.passes` are the only text of a stage. Here its syntax tree is changed:
 
 * `for i in range(n)`: the thread's own agent where states lie in registers (row `x[i]` → register `x_i`), else every
-  so-manieth agent. Totals that the loop carries (`a += ...`, `a = least(a, ...)`) are reduced over the block before
-  they are next read.
+  so-manieth agent. Totals that the loop carries (`a += ...`, `a = least(a, ...)`) are reduced over
+  the block before they are next read.
 * `for j in range(m)` within it: shared by the threads of one agent, unrolled; `x[j]` → the shared table.
 * `mem[c, i]`, `memory[c, i]`, `values[c]`: registers.
 """
@@ -33,10 +33,12 @@ class LoweringContext:
     columns  : row → (shared table, column) for rows that other agents read
     turn     : one agent i at a time, for all threads
     carried  : totals stay with each thread instead of being reduced over the block
-    cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
+    cells    : lines around a pair loop over cells, from outside in, instead of one loop over all
+               pairs
     exact    : an unrolled pair loop stops at the last agent (those beyond would be far away)
     alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
-    across   : rows over the others that each agent has to itself, and their places in the table that holds them
+    across   : rows over the others that each agent has to itself, and their places in the table
+               that holds them
     """
 
     shape: BlockLayout

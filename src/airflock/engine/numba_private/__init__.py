@@ -5,7 +5,8 @@ AIRFLOCK_PLAIN_NUMBA is set, drivers are compiled by plain `njit` and kept by Nu
 same flights, compiled more slowly.
 
 driver_compiler : the compiler of drivers, without the work that a driver never needs
-sealed_cache    : compiled drivers on disk under checksums, and a lock so that one process compiles each
+sealed_cache    : compiled drivers on disk under checksums, and a lock so that one process compiles
+                  each
 cuda_compiler   : kernels for GPUs, their PTX without a GPU
 """
 

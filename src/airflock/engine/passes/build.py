@@ -26,11 +26,13 @@ FEW = (FAULT_PREFIX, NUMBER_PREFIX, "unhindered_", "reach_", "clock", "sent_cloc
 class Builder:
     """Names rules, rows of the work table and records of the parameter row for one plan.
 
-    clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
+    clusters : lines that find the clusters of a metric, where a device does it otherwise than one
+               agent after another
     abreast  : whether two agents may go through the others of a pair rule together
     apart    : whether the rows that a stage reads can be arguments of a function
     ranges   : whether a loop over some of the lanes is one from the first of them to the last
-    by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
+    by_pairs : whether each pair of agents draws its random words by itself, not four receivers at
+               once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
     drifts   : whether agents may be watched by how fast they are beside the drift of the flock
     trails   : whether rows of faults and of agents that differ come last in the work table
@@ -169,7 +171,8 @@ class Builder:
     ) -> None:
         """One stage of a step: what it reads once, then its work for all agents or, sequentially, for agent i.
 
-        apart : the rows that it reads once become arguments, which the compiler then knows to lie apart in memory
+        apart : the rows that it reads once become arguments, which the compiler then knows to lie
+                apart in memory
         """
         # Most stages are one function. Two cases split them: rows as arguments that lie apart, and
         # turns, where the bindings are shared by all agents and only the body is called once for

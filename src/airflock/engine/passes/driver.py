@@ -91,13 +91,16 @@ LANE_COUNT_LINE = "m = n if n % 32 <= 10 else work.shape[1]"
 def flight_driver_text(plan: Plan) -> str:
     """Text of the driver that flies one world: function `advance(first, last, half, held, ...)`.
 
-    It flies the steps first to last - 1 and returns the next one, or minus the first agent (from 1) that found no room.
-    All that a flight carries from one step to the next lies in arrays, so that any cuts give the bits of the whole.
-    half : 1: step `first` has been sensed and decided already; 2: sense and decide at step `first`, and go no further
-    held : how far agents may have come since pairs were last looked at (m), how far they may come (m), whether the rest
-           of the collisions' memory is at its start, whether the flight has ended at a collision, whether agents have
-           their places (each 1 or 0); the drift of the flock then (m/s, three numbers) and its speed (m/s), and how
-           far from the origin agents may be (m)
+    It flies the steps first to last - 1 and returns the next one, or minus the first agent (from 1)
+    that found no room. All that a flight carries from one step to the next lies in arrays, so that
+    any cuts give the bits of the whole.
+    half : 1: step `first` has been sensed and decided already; 2: sense and decide at step `first`,
+           and go no further
+    held : how far agents may have come since pairs were last looked at (m), how far they may come
+           (m), whether the rest of the collisions' memory is at its start, whether the flight has
+           ended at a collision, whether agents have their places (each 1 or 0); the drift of the
+           flock then (m/s, three numbers) and its speed (m/s), and how far from the origin agents
+           may be (m)
     """
     return _text(flight_stages(plan), plan.model.name)
 

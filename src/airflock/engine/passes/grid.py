@@ -34,8 +34,10 @@ def grid_memory(
 ) -> tuple[tuple[NDArray[Any], ...], ...]:
     """Make the memory of the grid for n agents, as one argument or none; `rows` makes zeros on cache lines.
 
-    starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of : of each agent
-    packed : (place, component) states and, as an integer, the slot; flat : (component, place) states; ident : agents
+    starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of : of
+             each agent
+    packed : (place, component) states and, as an integer, the slot; flat : (component, place)
+             states; ident : agents
     Between two sorts, `tally` and `ident` are scratch of the search for links by cells.
     """
     if not plan.grid:

@@ -82,8 +82,8 @@ def driver_argument(name: str) -> ast.Name:
 def driver_name(name: str, kind: str, item: object = None) -> ast.Name:
     """A name that the driver binds for a stage.
 
-    kind : row, number, record, whole or scene; argument, of the driver's function; or rule, the plain function or class
-           `item`, which is named at the end
+    kind : row, number, record, whole or scene; argument, of the driver's function; or rule, the
+           plain function or class `item`, which is named at the end
     """
     made = ast.Name(name, LOAD)
     made.kind, made.item = kind, item  # type: ignore[attr-defined]

@@ -644,7 +644,8 @@ def lines_of(statements: list[ast.stmt]) -> list[str]:
 def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> SpecialisedText:
     """Text of a stage for a builder's plan.
 
-    known : what parameters of the stage stand for; others keep their names. What a vector is given is kept.
+    known : what parameters of the stage stand for; others keep their names. What a vector is given
+            is kept.
     """
     made = StatementSpecialiser(build)
     once, body, answer = made.run(stage, known)

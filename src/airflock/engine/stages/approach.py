@@ -1,8 +1,8 @@
 """Approach: how near two agents may have come since pairs were last looked at, so that most steps look at none.
 
-A pair comes nearer by no more than what both move beside a velocity that they share. So what counts is how fast agents
-are beside the drift of the flock, the mean velocity when pairs were last looked at: a flock that flies past at 20 m/s
-without a change of shape has nothing to look for.
+A pair comes nearer by no more than what both move beside a velocity that they share. So what counts
+is how fast agents are beside the drift of the flock, the mean velocity when pairs were last looked
+at: a flock that flies past at 20 m/s without a change of shape has nothing to look for.
 """
 
 import math

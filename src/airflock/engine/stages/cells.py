@@ -1,7 +1,8 @@
 """Cells: agents sorted into cells, by counting, and all that lies around a line of cells copied side by side.
 
-A line is a row of cells along x; of the agents around it those with one x are a slab. Candidates come in the order of
-slabs and within a cell by place, whatever the number of threads: the agents are counted in a fixed number of parts.
+A line is a row of cells along x; of the agents around it those with one x are a slab. Candidates
+come in the order of slabs and within a cell by place, whatever the number of threads: the agents
+are counted in a fixed number of parts.
 """
 
 from collections.abc import Callable
@@ -29,7 +30,8 @@ WHO, GROUP = "who", "group_of"  # what else of candidates is laid side by side: 
 def cell_box(n: int, near: Any, most_cells: int, flock: FlockRows, numbers: Any, work: Any, *, plan: Plan) -> Any:
     """Lower corner (m), cell size (m) and number of cells per axis: of the periodic box, or around the flock.
 
-    Cells are no smaller than `near` (m), and about `most_cells` at most; never more than there is memory for.
+    Cells are no smaller than `near` (m), and about `most_cells` at most; never more than there is
+    memory for.
     """
     w, x = numbers.w, flock.position
     low = np.zeros(3, work.dtype)
@@ -79,7 +81,8 @@ def sort_by_cells(
 ) -> Any:  # fmt: skip
     """Sort agents by cell; returns cell size (m) and number of cells per axis.
 
-    Each chunk of agents counts for itself; the counts of a cell, chunk by chunk, become the places of its agents.
+    Each chunk of agents counts for itself; the counts of a cell, chunk by chunk, become the places
+    of its agents.
 
     starts, tally   : first place of each cell; agents by chunk and cell, in one row
     cell_of, whose  : cell of each agent, agent at each place

@@ -1,8 +1,8 @@
 """Clusters: linked agents, found one after another, and the rules of an order parameter over each cluster.
 
-A cluster grows from its first agent, which is expanded, then the next of its members, until all are. The array
-`state` is 0 for an agent in no cluster yet, 1 for a member of the growing cluster, 2 for a member of an earlier one;
-`expanded` is 1 for agents with all links checked.
+A cluster grows from its first agent, which is expanded, then the next of its members, until all
+are. The array `state` is 0 for an agent in no cluster yet, 1 for a member of the growing cluster, 2
+for a member of an earlier one; `expanded` is 1 for agents with all links checked.
 """
 
 import math

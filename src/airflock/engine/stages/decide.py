@@ -59,7 +59,8 @@ def decide(
     """Ask each agent's law for a command, and keep what it remembers.
 
     mem            : what the law remembers, by field of its Memory and agent
-    percept_of     : makes a record of what is perceived; its fields are those of `passes.percept.record`, in order
+    percept_of     : makes a record of what is perceived; its fields are those of
+                     `passes.percept.record`, in order
     summed, walled : fields of Sums and Walls that neighbours and surfaces have summed
     """
     plan, model, flock, numbers = flight.plan, flight.model, flight.flock, flight.numbers

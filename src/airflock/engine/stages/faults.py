@@ -1,7 +1,8 @@
 """Faults: the one place where a flight asks the rules of faults, each in the stage that it disturbs.
 
-A fault of an agent is a column: when it began, how long it lasts (0 where there is none), its numbers, and what its
-rules want to know of that moment. Columns are written between two steps (`engine.fault_columns`), and only read here.
+A fault of an agent is a column: when it began, how long it lasts (0 where there is none), its
+numbers, and what its rules want to know of that moment. Columns are written between two steps
+(`engine.fault_columns`), and only read here.
 """
 
 from collections.abc import Iterable
@@ -29,9 +30,11 @@ def struck(
 ) -> tuple[int, int]:
     """Find the first and the end of the lanes that hold all agents with a fault of motion at a time (s) or later.
 
-    The span may be too wide: it includes a fault that ended within the last step, and lanes between affected ones.
+    The span may be too wide: it includes a fault that ended within the last step, and lanes between
+    affected ones.
 
-    kept : whether velocities before a step are kept until the next call; else each step copies its own
+    kept : whether velocities before a step are kept until the next call; else each step copies its
+           own
     """
     # Velocities before a step are copied at decisions, not at each step: a copy a step became two
     # calls of memcpy, a hundredth of a flight.

@@ -63,8 +63,9 @@ def keep(frame: int, flock: FlockRows, frames: Any, n: int, *, plan: Plan, slots
 def keep_frame(step: int, first: int, frames: Any, whole: Any, *, stages: Stages) -> None:
     """Keep a frame, where there are any.
 
-    The first frame is that of the first sample at or after the step `first`. The size of the
-    array decides whether a flight is recorded, not the plan: one driver flies with and without a recording.
+    The first frame is that of the first sample at or after the step `first`. The size of the array
+    decides whether a flight is recorded, not the plan: one driver flies with and without a
+    recording.
     """
     # A driver with and one without frames would be two compilations for `run --save`; one
     # comparison a sample is cheaper.
@@ -146,9 +147,12 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     half, held : as `passes.driver.flight` says
     past       : states that are not heard yet, by slot, component and agent
     sampled    : by stage: values that it samples, and which of the sums counts its instants
-    watched    : metrics that look for collisions, if all of them promise a distance beyond which there are none
-    drifts     : whether it counts how fast agents are beside the drift of the flock, or how fast they are
-    foretold   : whether the least distance of a pair is looked for alone, as long as there is nothing to measure
+    watched    : metrics that look for collisions, if all of them promise a distance beyond which
+                 there are none
+    drifts     : whether it counts how fast agents are beside the drift of the flock, or how fast
+                 they are
+    foretold   : whether the least distance of a pair is looked for alone, as long as there is
+                 nothing to measure
     collided   : place of the value that ends a flight, where a scenario says so
     slots      : whether agents lie in slots
     """

@@ -13,8 +13,8 @@ MORE = random.GUST + 256  # a second draw of the same step
 def gusts(numbers: Any, whole: Any, step: int, gust: Any, *, plan: Plan) -> Any:
     """Advance the gusts by a step; returns the wind wx wy wz, m/s.
 
-    gust : deviation from the mean wind (m/s) along each axis, from step to step; of Dryden turbulence the gust along
-           the mean wind (m/s), and two states each across it and upwards
+    gust : deviation from the mean wind (m/s) along each axis, from step to step; of Dryden
+           turbulence the gust along the mean wind (m/s), and two states each across it and upwards
     """
     # All agents feel the same gust: a flock is small beside the length scales of turbulence. Hence
     # agent 0 in the counter.

@@ -1,8 +1,9 @@
 """Links by cells: linked agents of a large flock, and the rules of an order parameter over each cluster.
 
-A cluster grows from its first agent: each member in turn looks at the cells around its own, which are as wide as links
-reach. The first `left` places of a cell hold its agents in no cluster yet; an agent that joins leaves them, so that
-none is visited twice. Results are those of `clusters` except for the order of sums.
+A cluster grows from its first agent: each member in turn looks at the cells around its own, which
+are as wide as links reach. The first `left` places of a cell hold its agents in no cluster yet; an
+agent that joins leaves them, so that none is visited twice. Results are those of `clusters` except
+for the order of sums.
 """
 
 import math
@@ -113,7 +114,8 @@ def clusters_by_cells(
 ) -> Any:
     """Sum the cluster rule of one metric over all clusters, by cells that are no smaller than links are long.
 
-    labels       : two rows of integers, scratch: places of all agents, cluster by cluster, and their cells
+    labels       : two rows of integers, scratch: places of all agents, cluster by cluster, and
+                   their cells
     tally, ident : integers, scratch: how many of a cell are left, and at which places
     """
     u, count, starts = totals(), cells.count, cells.starts

@@ -127,9 +127,10 @@ def sum_pairs(
 ) -> Any:
     """Sum the pair rules of all metrics over the others of each agent; returns the least squared distance, m².
 
-    nearest : whether the least distance is needed; only then, as two minima of the same squares in one loop are not
-              vectorised (7 times slower)
-    abreast : whether two agents go through the others together, where the least distance is not needed
+    nearest : whether the least distance is needed; only then, as two minima of the same squares in
+              one loop are not vectorised (7 times slower)
+    abreast : whether two agents go through the others together, where the least distance is not
+              needed
     """
     least2 = FAR
     if any(one.metric.pair is not None for one in metrics):

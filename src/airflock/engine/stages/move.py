@@ -116,8 +116,10 @@ def move(
     noise, gusts         : the stages of these names, for this step
     watched              : whether that speed is needed; else it is 0
     drifts, held         : whether it is that beside the drift of the flock (`stages.approach`)
-    hurt_first, hurt_end : lanes that hold all agents with a fault of motion (`stages.faults.struck`)
-    kept                 : whether their velocities are kept from step to step, so that no step copies them
+    hurt_first, hurt_end : lanes that hold all agents with a fault of motion
+                           (`stages.faults.struck`)
+    kept                 : whether their velocities are kept from step to step, so that no step
+                           copies them
     """
     plan, flock, numbers = flight.plan, flight.flock, flight.numbers
     x, v = flock.position, flock.velocity

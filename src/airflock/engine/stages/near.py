@@ -1,7 +1,8 @@
 """Pairs by cells: the pair rules of order parameters over those around an agent, until nobody else could change them.
 
-An agent looks at its own cell and the ring of cells around that, at the next ring, and so on. What is found is that of
-all pairs but for the order of sums. Parts of the flock are looked at side by side.
+An agent looks at its own cell and the ring of cells around that, at the next ring, and so on. What
+is found is that of all pairs but for the order of sums. Parts of the flock are looked at side by
+side.
 """
 
 import math
@@ -79,7 +80,8 @@ def in_ring(
 ) -> Any:  # fmt: skip
     """Add the pairs with all agents in one ring of cells around the own cell; the first ring includes its inside.
 
-    Cells side by side along x are one run of places; a run that goes over the ends of a periodic box is cut there.
+    Cells side by side along x are one run of places; a run that goes over the ends of a periodic
+    box is cut there.
     """
     plan, at, low, high, count, starts = flight.plan, home.at, home.low, home.high, cells.count, cells.starts
     # The ring is a shell of cells: full rows on its top, bottom and sides, and of the rows through

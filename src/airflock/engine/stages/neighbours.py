@@ -87,9 +87,10 @@ def neighbours(
     """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
     late   : age of data on arrival, s
-    draw   : where packets are lost, fills the rows of `words` for agent i and the others of its four
-    drawn  : draws the random word of a packet from agent j to agent i instead; each pair then also finds by itself what
-             stands between the two
+    draw   : where packets are lost, fills the rows of `words` for agent i and the others of its
+             four
+    drawn  : draws the random word of a packet from agent j to agent i instead; each pair then also
+             finds by itself what stands between the two
     meet   : fills the row `met` of agent i, where it does not meet all that it hears
     sums   : each field of Sums that is summed, and how it is reduced
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)

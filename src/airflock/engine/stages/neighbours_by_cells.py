@@ -1,8 +1,9 @@
 """Neighbours by cells: sum a law's rule over those in the cells around each agent, as `neighbours` does over all pairs.
 
-Cells are no smaller than the law reaches. Candidates of a cell are three slabs of agents that lie side by side, so that
-the loop over them runs in whole vectors; the last of these ends with empty places. Lines of cells are gone through
-side by side. The order of every sum is that of slabs and places, whatever the number of threads.
+Cells are no smaller than the law reaches. Candidates of a cell are three slabs of agents that lie
+side by side, so that the loop over them runs in whole vectors; the last of these ends with empty
+places. Lines of cells are gone through side by side. The order of every sum is that of slabs and
+places, whatever the number of threads.
 """
 
 from collections.abc import Callable
@@ -132,7 +133,8 @@ def neighbours_by_cells(
     """Sum the neighbour rule over those in the cells around each agent.
 
     starts, whose, packed, flat : what `sort` fills (`records.SortedCells`)
-    ident, totals_ : memory for the number of the agent at each place, and for sums by agent, in one row
+    ident, totals_ : memory for the number of the agent at each place, and for sums by agent, in one
+                     row
     sort           : the stage of this name, for cells no smaller than `near`, about `most_cells`
     widest         : how far the agents see at most where that differs among them, m
     """

@@ -1,7 +1,8 @@
 """Perceive: own state as measured, the others' as heard; the ring of past states, and faults, behind the delay.
 
-Of a sensor whose errors are added along each axis, those of what is measured and of what is sent are drawn apart. Any
-other measures once: what an agent sends is its state with the errors of its last measurement.
+Of a sensor whose errors are added along each axis, those of what is measured and of what is sent
+are drawn apart. Any other measures once: what an agent sends is its state with the errors of its
+last measurement.
 """
 
 from collections.abc import Callable, Iterable

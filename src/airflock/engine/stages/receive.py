@@ -221,7 +221,8 @@ def deliver_due(me: PairLoopAgent, j: int, packet: Any, flight: FlightView) -> N
 def extrapolated(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
     """Return the believed place of the sender of a packet along one axis, m: as sent, or carried forward.
 
-    Writes `core.radio.forward` out: as a call, compilers add in another order, and flights change in their last bits.
+    Writes `core.radio.forward` out: as a call, compilers add in another order, and flights change
+    in their last bits.
     """
     # Written out although `core.radio.forward` says the same; see the docstring.
     return packet[a] + packet[a + plan.dimensions] * age if plan.radio.carry is radio.forward else packet[a]
@@ -239,8 +240,8 @@ def carried_by_rule(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
 def packet_is_valid(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
     """Return True if the newest packet of another agent, of this age (s), still counts.
 
-    Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an agent, until they count
-    as lost.
+    Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an
+    agent, until they count as lost.
     """
     # At 60 % loss, counting only the packets of this decision left an agent deaf to more than half
     # of its neighbours: smallest distance 0.3 m in ten seeds; with data believed for `patience`,

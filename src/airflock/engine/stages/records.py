@@ -45,7 +45,8 @@ class Decision:
     step, agents : its number, and how many decide
     time, late   : now, and how old what is heard is on arrival, s
     fast, slow   : packets that either link of a radio sends in it
-    drawn        : draws the random word of what agent j sends agent i, where each pair draws for itself
+    drawn        : draws the random word of what agent j sends agent i, where each pair draws for
+                   itself
     """
 
     step: int
@@ -62,7 +63,8 @@ class CandidateRows:
     """Rows of the agents that a pair loop visits: all of a flock, or the candidates around a line of cells.
 
     number, group : of each, and what it is heard to do
-    square, away  : what the agent makes of each, from here on by its place among the others (`stages.state.Flock`)
+    square, away  : what the agent makes of each, from here on by its place among the others
+                    (`stages.state.Flock`)
     """
 
     number: Any
@@ -82,7 +84,8 @@ class CandidateRows:
 class SquaredRanges:
     """Squared ranges of an agent: of its radio and of its law, m².
 
-    radio, radio_ : square of the radio's range, and as squares that carry the guard TINY are compared with it
+    radio, radio_ : square of the radio's range, and as squares that carry the guard TINY are
+                    compared with it
     law           : square of the law's reach
     """
 

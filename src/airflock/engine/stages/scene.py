@@ -63,8 +63,9 @@ def move_goal(flock: FlockRows, numbers: Any, time: float, elapsed: float, n: in
 def move_own_goals(flock: FlockRows, numbers: Any, time: float, n: int, scene: Any, *, plan: Plan) -> int:
     """Send each agent's own goal on its way from where the agent was when all set out.
 
-    aim[0] keeps when they set out, s. aim[3] keeps how long all are under way, s: the longest way at goals.speed, which
-    a smooth course exceeds by half; it is negative where points are new, so that all set out now.
+    aim[0] keeps when they set out, s. aim[3] keeps how long all are under way, s: the longest way
+    at goals.speed, which a smooth course exceeds by half; it is negative where points are new, so
+    that all set out now.
     """
     x, w, at, axes = flock.position, numbers.w, scene.aim, range(plan.dimensions)
     who = flock.number
@@ -88,7 +89,8 @@ def move_own_goals(flock: FlockRows, numbers: Any, time: float, n: int, scene: A
 def let_appear(flock: FlockRows, numbers: Any, time: float, n: int, scene: Any) -> int:
     """Let stand what is due, as soon as nobody is in its place.
 
-    A shape waits until every agent is at start.clearance from its bounds, so that nothing appears on top of a drone.
+    A shape waits until every agent is at start.clearance from its bounds, so that nothing appears
+    on top of a drone.
     """
     x, w, later = flock.position, numbers.w, scene.later
     for r in range(len(later)):

@@ -1,8 +1,9 @@
 """Words that stages are written with, as they mean in plain Python. `engine.specialise` knows the same words.
 
-A stage is a plain function. It may use what is known when a driver is made (`plan`, `model`: tests of them choose what
-stays), the rows of a flock, numbers, and these words. A local that is bound in one place, to something known, does not
-appear in the driver; one that is bound in several is a variable there.
+A stage is a plain function. It may use what is known when a driver is made (`plan`, `model`: tests
+of them choose what stays), the rows of a flock, numbers, and these words. A local that is bound in
+one place, to something known, does not appear in the driver; one that is bound in several is a
+variable there.
 """
 
 import inspect

@@ -1,8 +1,9 @@
 """Rules as C99: the text that drivers are made of, function by function, in the subset of a law for one drone.
 
-`DriverSource` binds choices, writes out vectors and brings along what a rule calls; what is left are assignments,
-branches, loops, calls and arithmetic, of which each has one form in C. Types follow from the arguments: a number is
-`real`, a truth or a count `int`, a record a struct that is passed by a pointer, several values a struct of their own.
+`DriverSource` binds choices, writes out vectors and brings along what a rule calls; what is left
+are assignments, branches, loops, calls and arithmetic, of which each has one form in C. Types
+follow from the arguments: a number is `real`, a truth or a count `int`, a record a struct that is
+passed by a pointer, several values a struct of their own.
 """
 
 import ast
@@ -55,7 +56,8 @@ class Function(NamedTuple):
 class CPrinter:
     """Prints rules, and what they call, as C functions; structs and functions stand in the order of their need.
 
-    constants, vectors : choices, and vectors with their sizes, by record name, as `DriverSource` takes them
+    constants, vectors : choices, and vectors with their sizes, by record name, as `DriverSource`
+                         takes them
     prefix             : begins the names of structs that have none of their own
     """
 

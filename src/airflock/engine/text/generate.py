@@ -26,9 +26,11 @@ class DriverSource:
     """Collects functions and records, each once, as text in the order in which they are needed.
 
     decorator : line put above each function
-    constants : for each record name (p, b, q, ...) its choices and usual numbers, inlined as constants
+    constants : for each record name (p, b, q, ...) its choices and usual numbers, inlined as
+                constants
     vectors   : for each record name its vectors, with how many components each has
-    shorter   : general rules → those that do the same in this driver, in less; they have the names of the general ones
+    shorter   : general rules → those that do the same in this driver, in less; they have the names
+                of the general ones
     rows      : fields of each record that is made of a row of numbers, by its name
     lenient   : whether rules may call what only plain Python has, such as breakpoint() and print()
     """
@@ -65,7 +67,8 @@ class DriverSource:
     def name(self, item: Any, chosen: Mapping[str, str] = NO_CHOICES) -> str:
         """Name in the driver of a plain function or a NamedTuple class; adds its text on first use.
 
-        chosen : arguments of the function that are choices, by name; they become constants of its text
+        chosen : arguments of the function that are choices, by name; they become constants of its
+                 text
         """
         key = (item, *chosen.items()) if chosen else item
         # Two laws share the texts of rules, except of those that read their own parameters or

@@ -64,7 +64,8 @@ class BodyFit:
 
     refused : name → reason, for numbers that cannot be separated
     gain    : 2 Δ log-likelihood of a limited against an unlimited acceleration
-    seen    : least limit that goes with the log, m/s²: of 95 % by its likelihood, and at most the largest demand
+    seen    : least limit that goes with the log, m/s²: of 95 % by its likelihood, and at most the
+              largest demand
     """
 
     value: dict[str, float]
@@ -137,8 +138,8 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
     """Fit the body of `parts.bodies.motion` to logs with commands.
 
     dt   : motion step of the scenario that the numbers are for, s; 0 for continuous time
-    walk : what the sensor's own error adds to the noise of logged velocities, m²/s³: damping times noise of
-           `parts.sensors.langevin`; it is taken off the outer noise
+    walk : what the sensor's own error adds to the noise of logged velocities, m²/s³: damping times
+           noise of `parts.sensors.langevin`; it is taken off the outer noise
     """
     flying = logs.flying()
     if len(flying.time) < MIN_ROWS:
@@ -200,7 +201,8 @@ def _nothing(reason: str) -> BodyFit:
 def _body_loss(logs: FlightLogs, dt: float, lead: int = 0) -> tuple[Callable[..., float], int]:
     """Return the negative log-likelihood of the log parameters, and its number of blocks; a fifth number is the delay.
 
-    lead : rows at the start of each stretch that do not count, since the commands before them are unknown
+    lead : rows at the start of each stretch that do not count, since the commands before them are
+           unknown
     """
     span = _blocks(logs)
     out = np.zeros(int(span.max()) + 1)

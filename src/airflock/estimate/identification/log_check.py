@@ -174,7 +174,8 @@ class LogDisturbance:
     """Disturbances of a log by its logger.
 
     offset, drift : SD of the clocks' offsets (s) and rates (1); jitter: SD of single stamps, s
-    lost          : share of rows that are missing; bursts of `burst_seconds` s each are missing besides
+    lost          : share of rows that are missing; bursts of `burst_seconds` s each are missing
+                    besides
     white         : SD of white noise on velocities, m/s; resolution: of positions, m
     stamp_jitter  : SD of stamps of packets, s
     """

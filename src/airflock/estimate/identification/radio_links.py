@@ -125,8 +125,9 @@ def lost_by_sequence(heard: pd.DataFrame, logs: FlightLogs, comparable: bool) ->
     heard      : one row per packet that came, with seq, which counts the packets of each sender
     comparable : the logs are on one clock, to which stamps are put by the ages of packets
 
-    Packets count as sent on the fast link. Losses are gaps of seq between two packets that came; the stamp of a lost
-    one lies between theirs. Distances are those of the two logs at that time; rows outside of either are left out.
+    Packets count as sent on the fast link. Losses are gaps of seq between two packets that came;
+    the stamp of a lost one lies between theirs. Distances are those of the two logs at that time;
+    rows outside of either are left out.
     """
     if not comparable:
         return heard, ["no losses from seq: the clocks of the logs are not known to agree (--same-clock)"]
@@ -231,7 +232,8 @@ def clocks_apart(late: DelayFit) -> float:
 def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
     """Fit the reception curve of `parts.radios.links.received` to rows of got and not got per decision and pair.
 
-    heard  : receiver, sender, t, stamp, distance, got; if it is known, fast and slow: packets due on each link
+    heard  : receiver, sender, t, stamp, distance, got; if it is known, fast and slow: packets due
+             on each link
     period : time between decisions, s; k: radio parameters whose rates of packets are kept
     """
     nan = float("nan")
@@ -281,7 +283,8 @@ def radio_range(due: pd.DataFrame) -> float:
     """Return the distance (m) beyond which nothing arrives although the curve still allows it; infinite if there is
     none.
 
-    due : packets due and got by distance. Power falls with the square of the distance, and reception no faster.
+    due : packets due and got by distance. Power falls with the square of the distance, and
+          reception no faster.
     """
     some = due[due["got"] > 0]
     if not len(some):

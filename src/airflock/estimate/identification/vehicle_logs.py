@@ -21,7 +21,8 @@ class FlightLogs:
     """Rows of all drones, one drone after another.
 
     time (row,) s; position, velocity, command (row, axis) m and m/s; who (row,) number of the drone
-    new  : (row,) no row before this one belongs to it: the first, after a gap, after a reset of the estimator
+    new  : (row,) no row before this one belongs to it: the first, after a gap, after a reset of the
+           estimator
     standing : (row,) on the ground
     """
 
@@ -72,7 +73,8 @@ class FlightLogs:
 def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] | None = None) -> FlightLogs:
     """Make logs of imported tracks; raise RecordingError where velocities are missing.
 
-    standing : first and last time (s after each drone's first row) on the ground, unless the log contains it
+    standing : first and last time (s after each drone's first row) on the ground, unless the log
+               contains it
     """
     if not tracks:
         raise RecordingError("no tracks to identify from")

@@ -32,9 +32,11 @@ FEWEST = 100  # steps of each half
 class NeighbourFrame:
     """Neighbours of each individual before a frame, and the error of the law there; last axes are individuals.
 
-    even, odd    : what a mirror from left to right leaves as it is, and what it turns round, by kind
+    even, odd    : what a mirror from left to right leaves as it is, and what it turns round, by
+                   kind
     error        : along and to the left, m
-    counted      : whether the error counts; corrected: whether the walk was put right; new: who enters or is absent
+    counted      : whether the error counts; corrected: whether the walk was put right; new: who
+                   enters or is absent
     """
 
     even: Array
@@ -226,7 +228,8 @@ class PredictiveCheck:
 def flock_measures(motion: Array, is_present: NDArray[np.bool_], nearest: Callable[[Array], Array]) -> dict[str, float]:
     """Return means over time of polarisation, milling, speed (m/s), nearest distance and radius of the group (m).
 
-    motion : (frame, component, individual); there : (frame, individual); nearest : offsets to the nearest image
+    motion : (frame, component, individual); there : (frame, individual); nearest : offsets to the
+             nearest image
     """
     rows = []
     for frame, present in zip(motion, is_present, strict=True):
@@ -281,8 +284,9 @@ def run_predictive_check(
 def prediction_ends(name: str, drawn: Array) -> tuple[float, float]:
     """Return the ends between which one more flight lies, jointly for all measures in 95 %, from flights.
 
-    By Student's distribution, of logarithms, or of logits where a measure ends at 1. The extremes of 20 flights hold
-    another one in 90 % alone: of five measures of the law itself one lay outside every third time.
+    By Student's distribution, of logarithms, or of logits where a measure ends at 1. The extremes
+    of 20 flights hold another one in 90 % alone: of five measures of the law itself one lay outside
+    every third time.
     """
     from scipy.stats import t as student
 

@@ -269,10 +269,13 @@ class InnovationFilter:
     ) -> Array:
         """Return differences (frame, along and across, individual), m, between prediction and record; 0 if not counted.
 
-        numbers : values by column; usual : speed to which individuals return, m/s (of laws of headings)
+        numbers : values by column; usual : speed to which individuals return, m/s (of laws of
+                  headings)
         spans   : which; all by default
-        kept    : (frame, component, individual), filled with positions (m) and velocities (m/s) as put right
-        pushes  : (frame, axis, individual), filled with the change of velocity by the next frame that is predicted, m/s
+        kept    : (frame, component, individual), filled with positions (m) and velocities (m/s) as
+                  put right
+        pushes  : (frame, axis, individual), filled with the change of velocity by the next frame
+                  that is predicted, m/s
         """
         tracks, table, none = self.tracks, gains.table(self.tracks.period), np.zeros((0, 0, 0))
         pace = mean_speed if self.law is None or self.law.commands_heading else 0.0
@@ -330,9 +333,8 @@ def huber_differences(e: Array) -> Array:
     by the numbers that flew. The square of one such step would outweigh all that thousands of
     others say of a number. Normal differences keep their variance.
 
-    e : (step, component); differences up to `SOFT` of their `robust_deviation` stay as they are but for a factor, the
-        same for
-        all of a component
+    e : (step, component); differences up to `SOFT` of their `robust_deviation` stay as they are but
+        for a factor, the same for all of a component
     """
     if not len(e):
         return e
@@ -347,8 +349,8 @@ def huber_differences(e: Array) -> Array:
 def robust_deviation(e: Array) -> float:
     """Return the standard deviation of differences, with less weight of large ones (Huber 1964, proposal 2).
 
-    It is that at which the mean of min(z², SOFT |z|) is what it is of normal numbers z. A median would do as well, but
-    hangs on one difference alone, and with it each slope.
+    It is that at which the mean of min(z², SOFT |z|) is what it is of normal numbers z. A median
+    would do as well, but hangs on one difference alone, and with it each slope.
     """
     sizes = np.sort(np.abs(e)) + TINY
     square, linear = np.cumsum(sizes * sizes), np.cumsum(sizes)
@@ -395,7 +397,8 @@ class SpanScore:
 class FitModel:
     """A law (or none) with the numbers that are fitted, on the tracks.
 
-    numbers : of the law and its body, then four gains and, for a law of headings, what share of its speed one keeps
+    numbers : of the law and its body, then four gains and, for a law of headings, what share of its
+              speed one keeps
     Places are points of a unit cube, one coordinate per number.
     """
 

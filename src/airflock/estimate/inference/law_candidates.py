@@ -32,7 +32,8 @@ QUIET = {"sensors.kind": "perfect", "wind.gust": 0.0, "radio.loss": 0.0}
 class FitParameter:
     """A number of a law or its body: its column, its range, and the scale on which it is searched.
 
-    key : section and name; column : in a driver's row; unit; low, high : range that is sought; log : by its logarithm
+    key : section and name; column : in a driver's row; unit; low, high : range that is sought; log
+          : by its logarithm
     whole : only whole numbers below `high` are sought
     """
 
@@ -71,7 +72,8 @@ class LawCandidate:
     name     : as requested
     scenario : of its law, without any noise
     plan     : what flies it
-    numbers  : what may be fitted; noises : numbers of the law that are noise, which the scenario has at 0
+    numbers  : what may be fitted; noises : numbers of the law that are noise, which the scenario
+               has at 0
     body_noise : column of the body's own noise; -1 if it has none
     """
 
@@ -128,7 +130,8 @@ def law_scenarios(
     """Return scenarios of the laws, and half sides (m) of the periodic box common to all; 0 along an open axis.
 
     models : names of laws, presets, scenario files, files with a law, or Scenarios
-    topologies : kinds of neighbourhoods by which each is tried; metric : by distance, as the law itself has it
+    topologies : kinds of neighbourhoods by which each is tried; metric : by distance, as the law
+                 itself has it
     Raises ScenarioError with every error.
     """
     errors: list[tuple[str, str]] = []

@@ -140,12 +140,15 @@ class ParameterEstimate:
 class LawResult:
     """Score and numbers of one law on the tracks.
 
-    gain, error : log-likelihood of held-out steps above that of going straight on, and its standard error
+    gain, error : log-likelihood of held-out steps above that of going straight on, and its standard
+                  error
     ahead       : share of spans in which it predicts better
-    price       : gain that so many numbers bring by chance: half of each times log(steps) (Schwarz 1978)
+    price       : gain that so many numbers bring by chance: half of each times log(steps) (Schwarz
+                  1978)
     criterion   : Akaike's, of the fit, below that of going straight on; negative is better
     inside      : share of held-out differences within the 95 % that are predicted
-    missed      : share of what is explained with a free answer to neighbours beside the law that it leaves over, 0 to 1
+    missed      : share of what is explained with a free answer to neighbours beside the law that it
+                  leaves over, 0 to 1
     numbers     : fitted; with intervals for the best law alone
     by_chance   : of the best law, gain and error where individuals are shifted in time
     """
@@ -171,7 +174,8 @@ class InferResult:
     """Result of `infer`: laws from best to worst, the one that explains the tracks if any does, and its certainty.
 
     best   : None where no law predicts better than going straight on
-    steps  : individual steps that were predicted; fitted: frames on which laws were fitted, of all frames
+    steps  : individual steps that were predicted; fitted: frames on which laws were fitted, of all
+             frames
     check  : flights of the best law against the tracks
     """
 
@@ -491,7 +495,8 @@ def beats_chance(law: LawResult) -> bool:
 class _Comparison:
     """Comparison of laws with going straight on, on the same tracks.
 
-    spans : those on which the law found is fitted; halves : spans of which each half is predicted by the other
+    spans : those on which the law found is fitted; halves : spans of which each half is predicted
+            by the other
     """
 
     def __init__(self, followed: Sequence[SpanTracks], scale: TrackScale, seed: int, say: Callable[[str], None]):
@@ -559,8 +564,8 @@ class _Comparison:
     def by_chance(self, law: LawResult) -> tuple[float, float]:
         """Return the gain of a law, and its error, on the tracks with each individual shifted in time.
 
-        Everybody moves as before, and meets the walls; but neighbours are where others were. What the law gains there
-        is what the best of many places gains without any interaction.
+        Everybody moves as before, and meets the walls; but neighbours are where others were. What
+        the law gains there is what the best of many places gains without any interaction.
         """
         say = lambda _: self.say(f"{law.name}, by chance")  # noqa: E731
         null = _Comparison([shifted_in_time(each) for each in self.followed], self.scale, self.seed, say)

@@ -38,7 +38,8 @@ WITHIN = 1.959964  # standard deviations that hold 95 %
 class HeldOutScore:
     """Score of the predictions of spans that were not fitted.
 
-    surprise : (span,) negative log-likelihood; inside: share of differences within the 95 % that are predicted
+    surprise : (span,) negative log-likelihood; inside: share of differences within the 95 % that
+               are predicted
     """
 
     negative_log_likelihoods: Array
@@ -150,8 +151,8 @@ def merge_fits(law: LawCandidate, fits: Sequence[tuple[FitModel, Fit]]) -> tuple
 def drop_redundant(model: FitModel, fit: Fit, on_progress: Callable[[], None]) -> tuple[FitModel, Fit]:
     """Drop numbers without which the tracks are explained as well, the last declared first, since it matters least.
 
-    The rest is fitted again from where it is, and from where another number of the same unit takes the part of the
-    one that is dropped, such as one radius that of another.
+    The rest is fitted again from where it is, and from where another number of the same unit takes
+    the part of the one that is dropped, such as one radius that of another.
     """
     spans, lowest = sample_spans(model), fit.loss
     for k in reversed(range(model.named)):
@@ -206,8 +207,9 @@ def outlier_log_density(z: Array) -> Array:
 def predict_held_out(fits: Sequence[tuple[FitModel, Fit]], halves: Sequence[Sequence[int]]) -> HeldOutScore:
     """Predict each half by what was fitted to the other alone: its numbers, its thresholds and its variances.
 
-    A number that was sought on all tracks has seen what it is to predict, also where it is fitted again without: of
-    nine recordings of walks at random two were explained by thresholds that had been chosen so.
+    A number that was sought on all tracks has seen what it is to predict, also where it is fitted
+    again without: of nine recordings of walks at random two were explained by thresholds that had
+    been chosen so.
     """
     surprise = np.zeros(len(fits[0][0].spans))
     inside, count = 0.0, 0

@@ -34,7 +34,8 @@ WIDE_SLOPES, FINE_SLOPES = 0, 1  # how slopes are taken
 class Fit:
     """Point at which a model fits best.
 
-    place : of all numbers; free : indices of those that were fitted; score : on the spans of the fit
+    place : of all numbers; free : indices of those that were fitted; score : on the spans of the
+            fit
     loss  : negative log-likelihood with the prior
     """
 

@@ -140,7 +140,8 @@ def with_positions(tracks: SpanTracks, positions: Array) -> SpanTracks:
 def shifted_in_time(tracks: SpanTracks) -> SpanTracks:
     """Return the tracks with each individual at a time of its own: all move as they did, and nobody meets anybody.
 
-    Shifts are spread evenly over the recording; where an end meets the beginning, the individual leaves and enters.
+    Shifts are spread evenly over the recording; where an end meets the beginning, the individual
+    leaves and enters.
     """
     frames, n = len(tracks.seen), tracks.individual_count
     away = max(2, round(LONGEST_GAP / tracks.period)) + 1

@@ -22,8 +22,8 @@ PUSHED = -1  # noise that is no number of the law or its body
 class FitNoise:
     """Noise of a flight and of its tracks.
 
-    law   : number of the law or its body that is noise (column), and its value; PUSHED: SD of pushes of velocities,
-            m/s
+    law   : number of the law or its body that is noise (column), and its value; PUSHED: SD of
+            pushes of velocities, m/s
     speed : SD of a period's change of own speed, m/s, where speeds are the individuals' own
     seen  : SD of a seen position, m
     """
@@ -181,7 +181,8 @@ def estimate_noise(
 ) -> tuple[FitNoise, list[IntervalEnds]]:  # fmt: skip
     """Estimate the noise of a law and of its tracks; and ends for each level, None where the tracks set no limit.
 
-    scatter : draws of numbers about the point; fitted : where statistics are taken, the fit to the tracks
+    scatter : draws of numbers about the point; fitted : where statistics are taken, the fit to the
+              tracks
     levels  : shares of Student's distribution below an upper end, such as 0.975, the widest last
     """
     generator = np.random.default_rng(seed)
@@ -282,7 +283,8 @@ def correct_fit(
 ) -> CorrectedFit:
     """Correct a fit by flights of its own law, and find its intervals.
 
-    draws : numbers that explain the tracks as well (`sample_posterior`); spans : on which was fitted
+    draws : numbers that explain the tracks as well (`sample_posterior`); spans : on which was
+            fitted
     """
     from scipy.stats import norm as normal, t as student
 

@@ -1,8 +1,9 @@
 """Drag descent: down the gradient of the own induced drag, beside whatever else commands an aircraft.
 
-The third rule of Dimock & Selig (2003, Eq. 8) as a law of its own, to be added to any model that commands a velocity
-(`core.model.add_laws`, the section `[aero]` of a scenario): so a flock of drones becomes one of fixed-wing aircraft
-that look for each other's upwash. Its forward is the wing's (wing.frame): along x, or the mean heading of the flock.
+The third rule of Dimock & Selig (2003, Eq. 8) as a law of its own, to be added to any model that
+commands a velocity (`core.model.add_laws`, the section `[aero]` of a scenario): so a flock of
+drones becomes one of fixed-wing aircraft that look for each other's upwash. Its forward is the
+wing's (wing.frame): along x, or the mean heading of the flock.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,10 @@
 """Filaments: the downwash of discrete trailing and bound vortex filaments, and its slopes.
 
-A wing is m horseshoes side by side: bound segments across, two trailing legs each, straight back to infinity. Seen from
-another wing the downwash depends on the offset d = receiver - source alone, and with equal segments the influence of
-segment e on control point k depends on k - e alone: one row of 2 m - 1 numbers stands for a block of m x m. Column
-k - e + shift(m) of a row holds it; the columns before the first are zeros.
+A wing is m horseshoes side by side: bound segments across, two trailing legs each, straight back to
+infinity. Seen from another wing the downwash depends on the offset d = receiver - source alone, and
+with equal segments the influence of segment e on control point k depends on k - e alone: one row of
+2 m - 1 numbers stands for a block of m x m. Column k - e + shift(m) of a row holds it; the columns
+before the first are zeros.
 """
 
 import math
@@ -43,7 +44,8 @@ def leg_slopes(dx, y, dz, core2):
 def influences(table, row, dx, dy, dz, m, h, core2):
     """Write one row: downwash (m/s) per unit circulation at control point k of segment e.
 
-    table : (rows, m + lanes(m)); dx, dy, dz : centre of the receiving wing minus centre of the source, m; h : pitch, m
+    table : (rows, m + lanes(m)); dx, dy, dz : centre of the receiving wing minus centre of the
+            source, m; h : pitch, m
     """
     first = lanes(m) - m
     for k in range(2 * m):

@@ -1,11 +1,13 @@
 """Gradient of each wing's own induced drag with its own position, in four ways.
 
-cells         : central difference over one cell of the grid, all circulations solved again (Dimock & Selig 2003, Eq. 8)
+cells         : central difference over one cell of the grid, all circulations solved again (Dimock
+                & Selig 2003, Eq. 8)
 cells_frozen  : the same with the circulations of all other wings held
 analytic      : derivative of the linear system by its adjoint, all wings respond
 frozen        : derivative with the circulations of all other wings held
 
-A wing's drag is a quadratic form in the wash of the others, so its derivative with that wash is known in closed form.
+A wing's drag is a quadratic form in the wash of the others, so its derivative with that wash is
+known in closed form.
 """
 
 from airflock.core import FAR
@@ -139,8 +141,9 @@ def slopes_of(n, work, wing):
 def own_part(i, work, wing):
     """Derivative of the drag of wing i with the wash on it, over density times pitch, m²/s: row i of `source`.
 
-    With drag = circulation · (own wash + wash) and circulation = alone - response · wash, and because the response
-    undoes the wing's own equation, it is alone + 2 speed · response · circulation / stiffness.
+    With drag = circulation · (own wash + wash) and circulation = alone - response · wash, and
+    because the response undoes the wing's own equation, it is alone + 2 speed · response ·
+    circulation / stiffness.
     """
     m = segments_of(wing)
     source = work.source

@@ -1,9 +1,10 @@
 """Lifting line of a flock: n equal wings, each carrying its weight, in each other's wash.
 
-On every segment circulation = stiffness · (alpha - downwash / speed), and on every wing the circulations add up to what
-carries the weight, which fixes alpha: the zero-lift angle cancels and the whole system is linear. A wing's own block is
-the same for all and is eliminated once: circulation = alone - response · (wash of the others). What is left couples
-wings that are apart, and is settled wing by wing, front to back; where wings lie on top of each other and that does not
+On every segment circulation = stiffness · (alpha - downwash / speed), and on every wing the
+circulations add up to what carries the weight, which fixes alpha: the zero-lift angle cancels and
+the whole system is linear. A wing's own block is the same for all and is eliminated once:
+circulation = alone - response · (wash of the others). What is left couples wings that are apart,
+and is settled wing by wing, front to back; where wings lie on top of each other and that does not
 settle, by one dense factorisation. There is no case without an answer.
 
 Dimock & Selig 2003, Eqs 5-7; theory after Katz and Plotkin, Low-Speed Aerodynamics, chapter 8.
@@ -25,7 +26,8 @@ class Work(NamedTuple):
     Columns of sources are filled up with zeros to w = lanes(m).
 
     place       : (3, n) where the aerodynamics sees the wings, m
-    alone       : (3, w) circulation without wash; its share per sum of 1; [2][0] is 1 once all this is prepared,
+    alone       : (3, w) circulation without wash; its share per sum of 1; [2][0] is 1 once all this
+                  is prepared,
                   [2][1] the sum of a wing's response to one radian
     response    : (w, m) change of circulation per wash, m
     square      : (m, 2 m) for the self block and its inverse
@@ -33,10 +35,13 @@ class Work(NamedTuple):
     circulation : (n, w) m²/s; wash : (n, w) downwash of all other wings, m/s
     spare       : (1, m) any product
     kept, trial : (2 n + 1, m + w) and (n, w) while one wing is moved to see what its drag would be
-    slopes      : (3 n n, m + w) derivatives of the tables; mirror : (n n, m + w) the tables backwards
+    slopes      : (3 n n, m + w) derivatives of the tables; mirror : (n n, m + w) the tables
+                  backwards
     adjoint     : (n, w) sensitivity of one wing's drag to all washes; source : (n, w) its own part
-    dense       : (n m, n m) factors; pivots, column : (1, n m); touched only where sweeps do not settle
-    WITHIN      : what is written before it is read in each call; the rest is carried from call to call
+    dense       : (n m, n m) factors; pivots, column : (1, n m); touched only where sweeps do not
+                  settle
+    WITHIN      : what is written before it is read in each call; the rest is carried from call to
+                  call
     """
 
     WITHIN = ("dense", "pivots", "column")  # type: ignore[misc]

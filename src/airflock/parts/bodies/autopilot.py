@@ -1,9 +1,10 @@
 """Autopilot: a multirotor that answers a velocity command late, with a lag, and with limited acceleration and jerk.
 
-The defaults are measured: ArduCopter 4.6.0-dev in software in the loop, in GUIDED mode with velocity set-points, at its
-own defaults. From the set-points (log message GUIP) to the velocity it is a dead time of 0.40 s and a lag of 1.20 s;
-accelerations reach WPNAV_ACCEL, and change by PSC_JERK_XY. With WPNAV_ACCEL 500 and PSC_JERK_XY 20 it is another drone:
-delay = 0.35, tau = 0.5, a_max = 5, jerk = 20.
+The defaults are measured: ArduCopter 4.6.0-dev in software in the loop, in GUIDED mode with
+velocity set-points, at its own defaults. From the set-points (log message GUIP) to the velocity it
+is a dead time of 0.40 s and a lag of 1.20 s; accelerations reach WPNAV_ACCEL, and change by
+PSC_JERK_XY. With WPNAV_ACCEL 500 and PSC_JERK_XY 20 it is another drone: delay = 0.35, tau = 0.5,
+a_max = 5, jerk = 20.
 
 Dead time and lag were measured as one lag without limits. With both limits beside them this body is
 slower than that autopilot: a dead time of 0.1 to 0.2 s and a lag of 0.5 s come closest to its logs
@@ -54,8 +55,9 @@ class Memory(NamedTuple):
 def move(vx, vy, vz, mx, my, mz, cx, cy, cz, gx, gy, gz, wx, wy, wz, memory, dt, b):
     """Velocity after dt, m/s, and Memory: relax to the command within a_max, at most b.jerk; then noise and wind.
 
-    Like `motion.move`, but for the jerk: the acceleration goes towards the one that is wanted by at most jerk dt. Both
-    limits hold for the length of the vector, as ArduCopter limits a horizontal command.
+    Like `motion.move`, but for the jerk: the acceleration goes towards the one that is wanted by at
+    most jerk dt. Both limits hold for the length of the vector, as ArduCopter limits a horizontal
+    command.
     """
     ax, ay, az = shorten((cx - mx) / b.tau, (cy - my) / b.tau, (cz - mz) / b.tau, b.a_max)
     jx, jy, jz = shorten(ax - memory.ax, ay - memory.ay, az - memory.az, b.jerk * dt)

@@ -1,11 +1,13 @@
 """Battery: what hovering draws from it, and what of the largest thrust its voltage leaves.
 
-A rotor that carries a thrust T in air of density ρ takes the power T^1.5 / sqrt(2 ρ A) over its figure of merit
-(momentum theory; Leishman 2006, Principles of Helicopter Aerodynamics, section 2.8), so the power of hovering tells
-that of every other thrust. What climbing, forward flight and electronics add or save is left out.
+A rotor that carries a thrust T in air of density ρ takes the power T^1.5 / sqrt(2 ρ A) over its
+figure of merit (momentum theory; Leishman 2006, Principles of Helicopter Aerodynamics, section
+2.8), so the power of hovering tells that of every other thrust. What climbing, forward flight and
+electronics add or save is left out.
 
-The voltage of lithium cells falls as they empty, and with it the largest thrust: about as its square. Here that thrust
-falls linearly with the energy that was drawn, and is zero once the battery is empty.
+The voltage of lithium cells falls as they empty, and with it the largest thrust: about as its
+square. Here that thrust falls linearly with the energy that was drawn, and is zero once the battery
+is empty.
 """
 
 import math

@@ -1,14 +1,16 @@
 """Dryden turbulence: gusts whose spectrum is that of the military specification MIL-F-8785C (1980), section 3.7.
 
-Up to 305 m above ground its lengths and intensities follow from the height h and the wind at 6 m (20 ft), W:
+Up to 305 m above ground its lengths and intensities follow from the height h and the wind at 6 m
+(20 ft), W:
 
     L_w = h,  L_u = L_v = h / (0.177 + 0.000823 h)^1.2 (feet),
     σ_w = 0.1 W,  σ_u = σ_v = σ_w / (0.177 + 0.000823 h)^0.4.
 
-A flock that flies through frozen air at an airspeed V meets u, along the mean wind, as a process of first order, and v
-across it and w upwards as processes with the spectrum Φ(ω) = σ² L/(πV) (1 + 3 (Lω/V)²) / (1 + (Lω/V)²)². Both are
-advanced exactly, so that variance and spectrum do not depend on the time step. The flock is small beside L: all of it
-feels the same gust. The rates of rotation of the specification are left out, as no body here has them.
+A flock that flies through frozen air at an airspeed V meets u, along the mean wind, as a process of
+first order, and v across it and w upwards as processes with the spectrum Φ(ω) = σ² L/(πV) (1 + 3
+(Lω/V)²) / (1 + (Lω/V)²)². Both are advanced exactly, so that variance and spectrum do not depend on
+the time step. The flock is small beside L: all of it feels the same gust. The rates of rotation of
+the specification are left out, as no body here has them.
 """
 
 import math
@@ -48,8 +50,8 @@ def along(u, g, dt, length, sigma, airspeed):
 def across(p, q, g, h, dt, length, airspeed):
     """The two states of a gust across the mean wind after dt, from normal numbers g and h; without a unit.
 
-    p is a process of first order of variance 1, q follows it with the same lag. What comes anew of both in a step has
-    the covariance that keeps their own: 1 of p, 1/2 of q and of both.
+    p is a process of first order of variance 1, q follows it with the same lag. What comes anew of
+    both in a step has the covariance that keeps their own: 1 of p, 1/2 of q and of both.
     """
     r = dt * airspeed / length
     keep = math.exp(-r)

@@ -1,23 +1,24 @@
 """Fixed wing: a point mass on the wing of the section [wing], in coordinated turns: three freedoms and a bank.
 
-The equations are those of a point mass without sideslip (Stengel 2004, Flight Dynamics, sections 2.6 and 3.1): with
-airspeed V, climb angle γ, course χ, bank φ and load factor n = lift / weight,
+The equations are those of a point mass without sideslip (Stengel 2004, Flight Dynamics, sections
+2.6 and 3.1): with airspeed V, climb angle γ, course χ, bank φ and load factor n = lift / weight,
 
     dV/dt = (T - D) / m - g sin γ,    V dγ/dt = g (n cos φ - cos γ),    V cos γ dχ/dt = g n sin φ,
     D = q S cd0 + (n W)² / (q π e b²),    q = ρ V² / 2.
 
-Lift is bounded by stall (cl_max) and by n_max, thrust by a largest force and a largest power. Controllers: a bank for
-the error of course, a load factor for the error of climb, a thrust for the error of speed; where thrust does not
-suffice the nose goes down and speed is kept, as total-energy controllers do. Bank follows with a lag of first order and
-a largest rate of roll; there is no sideslip, no pitch dynamics and no flap. All is relative to the air, which the
-aircraft is taken to know: wind is a true airspeed, and a velocity over ground is followed with the nose into the wind.
+Lift is bounded by stall (cl_max) and by n_max, thrust by a largest force and a largest power.
+Controllers: a bank for the error of course, a load factor for the error of climb, a thrust for the
+error of speed; where thrust does not suffice the nose goes down and speed is kept, as total-energy
+controllers do. Bank follows with a lag of first order and a largest rate of roll; there is no
+sideslip, no pitch dynamics and no flap. All is relative to the air, which the aircraft is taken to
+know: wind is a true airspeed, and a velocity over ground is followed with the nose into the wind.
 
-Energy is the work of thrust over `use`. With body.battery = "lithium" the largest thrust falls with it as in
-`parts.bodies.battery`; when the battery is empty the aircraft glides, and on the ground it is absent from then on. In a
-plane, which holds its height, it only grows slower.
+Energy is the work of thrust over `use`. With body.battery = "lithium" the largest thrust falls with
+it as in `parts.bodies.battery`; when the battery is empty the aircraft glides, and on the ground it
+is absent from then on. In a plane, which holds its height, it only grows slower.
 
-Integration: V, γ and χ one after another with the values after the step of the controllers, of first order in dt; turns
-keep the speed exactly. In a plane the height is held by the plane itself.
+Integration: V, γ and χ one after another with the values after the step of the controllers, of
+first order in dt; turns keep the speed exactly. In a plane the height is held by the plane itself.
 """
 
 import math
@@ -122,7 +123,8 @@ def endures(memory, b):
 def climbing(up, v, drag, slow, possible, b):
     """Sine of the commanded climb angle: for a vertical speed `up` (m/s), within what thrust and speed allow.
 
-    slow : acceleration that the speed controller demands, over gravity; possible : largest thrust over weight
+    slow : acceleration that the speed controller demands, over gravity; possible : largest thrust
+           over weight
     """
     spare = possible - drag - slow
     low = -math.sin(b.dive_max)

@@ -24,7 +24,8 @@ def wander(tau, dt):
 def gap_left(gap, time, tau, rate, a_max):
     """Return the velocity gap (m/s) left after `time` (s), and for how long of it a_max limited the motion (s).
 
-    Saturated while the gap exceeds a_max tau, where it falls by a_max; then exponential with `rate` (`decay_rate`).
+    Saturated while the gap exceeds a_max tau, where it falls by a_max; then exponential with `rate`
+    (`decay_rate`).
     """
     limited = min(max((gap - a_max * tau) / a_max, 0.0), time)
     return (gap - a_max * limited) * math.exp(-(time - limited) * rate), limited

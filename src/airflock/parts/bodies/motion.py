@@ -33,9 +33,10 @@ class Parameters(BodyParameters):
 def move(vx, vy, vz, mx, my, mz, cx, cy, cz, gx, gy, gz, wx, wy, wz, dt, b):
     """Velocity after dt, m/s: relax to the command, saturate, then add outer noise and the push of the wind.
 
-    The controller sees the measured velocity m, so the measurement error enters at every step; the noise comes after
-    the saturation (authors' program; Methods of Vásárhelyi et al. 2018). Wind pushes with b.drag times its velocity:
-    the drag of the own motion is part of tau. Our choice, because the paper has no wind.
+    The controller sees the measured velocity m, so the measurement error enters at every step; the
+    noise comes after the saturation (authors' program; Methods of Vásárhelyi et al. 2018). Wind
+    pushes with b.drag times its velocity: the drag of the own motion is part of tau. Our choice,
+    because the paper has no wind.
     """
     ax, ay, az = shorten((cx - mx) / b.tau, (cy - my) / b.tau, (cz - mz) / b.tau, b.a_max)
     k = math.sqrt(2.0 * b.noise * dt)

@@ -1,19 +1,22 @@
 """Quadrotor without yaw: a velocity controller, an attitude that turns, motors that lag, and air.
 
-The equations are the usual ones of a multirotor (Mahony, Kumar and Corke 2012, IEEE Robotics & Automation Magazine
-19(3)): thrust along the body's axis n, weight, drag. Yaw is left out, since flocking never turns the nose; so attitude
-is the direction n and its turning rate w. Controllers follow the commanded velocity one behind the other, as autopilots
-do: proportional and integral in velocity, with limits of acceleration and tilt; then a turn of n towards the wanted
-direction, proportional and damped, with a limited angular acceleration; then motors that lag.
+The equations are the usual ones of a multirotor (Mahony, Kumar and Corke 2012, IEEE Robotics &
+Automation Magazine 19(3)): thrust along the body's axis n, weight, drag. Yaw is left out, since
+flocking never turns the nose; so attitude is the direction n and its turning rate w. Controllers
+follow the commanded velocity one behind the other, as autopilots do: proportional and integral in
+velocity, with limits of acceleration and tilt; then a turn of n towards the wanted direction,
+proportional and damped, with a limited angular acceleration; then motors that lag.
 
-Forces are per mass. Drag is relative to the air: a part proportional to the speed across n (rotor drag, as in Faessler
-et al. 2018) and a part that grows with its square; both, and the largest thrust, grow with the density of the air.
+Forces are per mass. Drag is relative to the air: a part proportional to the speed across n (rotor
+drag, as in Faessler et al. 2018) and a part that grows with its square; both, and the largest
+thrust, grow with the density of the air.
 
-With body.battery = "lithium" energy is drawn as in `parts.bodies.battery`, the largest thrust falls with it, and when
-the battery is empty the motors stop: in space the quadrotor falls, and on the ground it is absent from then on; in a
-plane drag brings it to rest.
+With body.battery = "lithium" energy is drawn as in `parts.bodies.battery`, the largest thrust falls
+with it, and when the battery is empty the motors stop: in space the quadrotor falls, and on the
+ground it is absent from then on; in a plane drag brings it to rest.
 
-Integration: semi-implicit Euler, of first order in dt. In a plane the height is held by the plane itself.
+Integration: semi-implicit Euler, of first order in dt. In a plane the height is held by the plane
+itself.
 """
 
 import math
@@ -91,8 +94,10 @@ class Parameters(BodyParameters):
 class Memory(NamedTuple):
     """State of a quadrotor from step to step.
 
-    n : direction of thrust; w, a : its turning rate (rad/s) and angular acceleration (rad/s²), which the motors give
-    thrust : over weight; i : integral of the velocity error, m/s²; used : energy drawn from the battery, J
+    n : direction of thrust; w, a : its turning rate (rad/s) and angular acceleration (rad/s²),
+                                    which the motors give
+    thrust : over weight; i : integral of the velocity error, m/s²; used : energy drawn from the
+             battery, J
     """
 
     nx: float = 0.0
@@ -148,7 +153,8 @@ def tilted(ax, ay, az, b):
 def turned(m, fx, fy, fz, lag, dt, b):
     """Direction n of thrust after dt on its way to the direction of f, its turning rate and angular acceleration.
 
-    lag : share of the way to the demand that the motors go in dt. Returns nx ny nz wx wy wz ax ay az.
+    lag : share of the way to the demand that the motors go in dt. Returns nx ny nz wx wy wz ax ay
+          az.
     """
     k = b.stiffness / norm(fx, fy, fz)
     sx, sy, sz = shorten(

@@ -31,8 +31,8 @@ class Parameters(BodyParameters):
 def move(vx, vy, vz, cx, cy, cz, dt, b):
     """Velocity after dt, m/s: turn by at most b.turn dt towards the unit vector c, at constant speed.
 
-    At rest the heading is free and becomes c. Straight backwards no side is nearer, and the heading is kept until
-    noise or neighbours break the tie.
+    At rest the heading is free and becomes c. Straight backwards no side is nearer, and the heading
+    is kept until noise or neighbours break the tie.
     """
     f = 1.0 / norm(vx, vy, vz)
     hx = f * vx

@@ -1,6 +1,7 @@
 """Clock: the agent's clock is ahead. It stamps its packets, and dates those of others, by it.
 
-Only rules that use ages are affected: extrapolation over two links (radio.kind = "links"), and laws that request `age`.
+Only rules that use ages are affected: extrapolation over two links (radio.kind = "links"), and laws
+that request `age`.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,9 @@
 """Fitness of formations: of Dimock & Selig 2003 (Eq. 10), and one that its winners cannot cheat so easily.
 
 paper : minus the mean power per bird, or a fixed low value after a collision.
-sound : minus the power and, in units of a lone bird's power, penalties for closeness (graded), collisions, steady
-        oscillation and a formation that has not settled; to be averaged over several starts of 60 s or more.
+sound : minus the power and, in units of a lone bird's power, penalties for closeness (graded),
+        collisions, steady oscillation and a formation that has not settled; to be averaged over
+        several starts of 60 s or more.
 """
 
 import math

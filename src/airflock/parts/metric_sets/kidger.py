@@ -1,10 +1,11 @@
 """Fitness from the measures of Kidger's thesis, whose first wish is to learn parameters from them. Our definition.
 
-Four factors from 0 to 1: share flocked; share of goals reached, averaged over the flight, so that sooner is better; and
-two that halve their root at a given number of collisions per agent and minute, of two agents and with the environment.
+Four factors from 0 to 1: share flocked; share of goals reached, averaged over the flight, so that
+sooner is better; and two that halve their root at a given number of collisions per agent and
+minute, of two agents and with the environment.
 
-A collision of two agents counts when they meet and once more for every second that they stay in contact: n_coll alone
-is smallest where a flock falls together into one point and never parts.
+A collision of two agents counts when they meet and once more for every second that they stay in
+contact: n_coll alone is smallest where a flock falls together into one point and never parts.
 """
 
 import math

@@ -1,6 +1,7 @@
 """The six partial fitnesses and their product (Vásárhelyi et al. 2018, Eqs 17-22).
 
-F_cluster is printed with three arguments in F3; F1 takes three and fits the definition: F1(N_min, N/5, N/5).
+F_cluster is printed with three arguments in F3; F1 takes three and fits the definition: F1(N_min,
+N/5, N/5).
 """
 
 from collections.abc import Mapping

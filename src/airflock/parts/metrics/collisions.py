@@ -1,8 +1,8 @@
 """Collision risk and number of collisions (Vásárhelyi et al. 2018, Eq. 14).
 
-Theta(r_ij - r_coll) is printed; pairs nearer than r_coll count, as in the authors' program and as in the text. An event
-is counted when an agent that was in nobody's reach comes within r_coll of an agent with a lower index: a contact
-counts once, and again only after a separation.
+Theta(r_ij - r_coll) is printed; pairs nearer than r_coll count, as in the authors' program and as
+in the text. An event is counted when an agent that was in nobody's reach comes within r_coll of an
+agent with a lower index: a contact counts once, and again only after a separation.
 """
 
 from typing import NamedTuple

@@ -1,8 +1,9 @@
 """Contacts with walls, obstacles and the scene, of any law: agents are spheres of radius q.r_body.
 
-A contact begins when a sphere first reaches beyond where flying is allowed, and counts once until it is free again. Our
-definition. Looked at every metrics.collision_period, so that a short touch is not missed. Where and with what contacts
-happened is reported by `airflock.recordings.measures.contacts` from a recording.
+A contact begins when a sphere first reaches beyond where flying is allowed, and counts once until
+it is free again. Our definition. Looked at every metrics.collision_period, so that a short touch is
+not missed. Where and with what contacts happened is reported by
+`airflock.recordings.measures.contacts` from a recording.
 """
 
 from typing import NamedTuple

@@ -1,7 +1,7 @@
 """Collisions with the environment: spheres of radius q.r_body that touch what stands in the scene (Kidger).
 
-The way between two looks is swept, so that nothing thin is missed. A contact counts once, and again only after a
-separation.
+The way between two looks is swept, so that nothing thin is missed. A contact counts once, and again
+only after a separation.
 """
 
 from typing import NamedTuple

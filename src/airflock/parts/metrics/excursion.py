@@ -1,7 +1,8 @@
 """Excursion beyond walls and into obstacles (Vásárhelyi et al. 2018, Eq. 15), and clearance, the room that is left.
 
-phi_wall is the mean over those outside, and 0 if nobody is: it says nothing about flights that stayed inside. The
-smallest clearance says how near the nearest of them came; it is below 0 where somebody was outside.
+phi_wall is the mean over those outside, and 0 if nobody is: it says nothing about flights that
+stayed inside. The smallest clearance says how near the nearest of them came; it is below 0 where
+somebody was outside.
 """
 
 import math

@@ -1,12 +1,14 @@
 """Sub-groups as separate flocks: what Zapotecatl et al. 2016 leave as future work. Our definitions.
 
-Extension and quality of the whole cannot distinguish a dispersed flock from one that split into tight groups. Here
-agents nearer than r_cluster belong to one group. Distances and angles are taken from the own group, and an agent
-without companions costs as much as one in collision:
+Extension and quality of the whole cannot distinguish a dispersed flock from one that split into
+tight groups. Here agents nearer than r_cluster belong to one group. Distances and angles are taken
+from the own group, and an agent without companions costs as much as one in collision:
 
-    cns_ext_groups = 1 - (sum of distances to the own group's centre + k · (colliding + alone)) / (max_e n)
+    cns_ext_groups = 1 - (sum of distances to the own group's centre + k · (colliding + alone)) /
+    (max_e n)
 
-One group: equal to cns_ext. Tight groups far apart: near 1 while cns_ext falls. Everybody alone: 1 - k/max_e.
+One group: equal to cns_ext. Tight groups far apart: near 1 while cns_ext falls. Everybody alone: 1
+- k/max_e.
 """
 
 import math

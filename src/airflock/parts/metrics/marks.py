@@ -1,9 +1,10 @@
 """Quality with collisions as the authors' program of Zapotecatl et al. 2016 counts them: `metrics.count = "program"`.
 
-Eq. 18 counts every boid with another within r_b, as `quality` does. The program goes through the pairs i < j, marks
-both boids of a pair that touches, and skips the pairs of a boid i that is marked already. So it can miss the members of
-a chain (never does it mark one that touches nobody), and its answer depends on the order of the boids. The published
-figures were counted so. Everything else is as in `quality`.
+Eq. 18 counts every boid with another within r_b, as `quality` does. The program goes through the
+pairs i < j, marks both boids of a pair that touches, and skips the pairs of a boid i that is marked
+already. So it can miss the members of a chain (never does it mark one that touches nobody), and its
+answer depends on the order of the boids. The published figures were counted so. Everything else is
+as in `quality`.
 """
 
 from typing import NamedTuple

@@ -1,7 +1,8 @@
 """Power that the birds of a flock spend, and what flying together saves (Dimock & Selig 2003, Eq. 10).
 
-Drag times airspeed of the wing that the scenario describes, from one lifting-line solution per instant: of a simulated
-flock, another model's flock or a flight log. The saving is against a lone wing of the same discretisation.
+Drag times airspeed of the wing that the scenario describes, from one lifting-line solution per
+instant: of a simulated flock, another model's flock or a flight log. The saving is against a lone
+wing of the same discretisation.
 """
 
 from typing import NamedTuple

@@ -1,8 +1,9 @@
 """Extension, polarization, collisions, consistencies and quality of a flock (Zapotecatl et al. 2016, Eqs 13-24).
 
-Polarization is an angle in degrees, 0 if all fly alike; not to be confused with the order parameter polarisation,
-1 if all fly alike. Its printed range ends at 90°, the program's at 180°, as here. Eq. 18 says r_b is the radius of the
-body, yet compares the distance of two centres with it; so does the program, and so do we.
+Polarization is an angle in degrees, 0 if all fly alike; not to be confused with the order parameter
+polarisation, 1 if all fly alike. Its printed range ends at 90°, the program's at 180°, as here. Eq.
+18 says r_b is the radius of the body, yet compares the distance of two centres with it; so does the
+program, and so do we.
 """
 
 import math

@@ -1,8 +1,9 @@
 """Area and shape of a group: the ellipse, or in space the ellipsoid, whose uniform filling has the same second moments.
 
-Our definitions. A uniform ellipse of half axes a, b has the variances a²/4, b²/4; a uniform ellipsoid a²/5, b²/5, c²/5.
-Agents on one line have no area, agents on one plane no volume, and rounding does not give them one: a determinant of
-moments below `FLAT` of the product of its diagonal, which bounds it (Hadamard), counts as 0.
+Our definitions. A uniform ellipse of half axes a, b has the variances a²/4, b²/4; a uniform
+ellipsoid a²/5, b²/5, c²/5. Agents on one line have no area, agents on one plane no volume, and
+rounding does not give them one: a determinant of moments below `FLAT` of the product of its
+diagonal, which bounds it (Hadamard), counts as 0.
 """
 
 import math

@@ -1,7 +1,8 @@
 """Steadiness of a formation: how close its members come, and how much they still move once they should have settled.
 
-Our choice, because Dimock & Selig 2003 name both as what their fitness lacks: no steady oscillation, a stable formation
-after a fixed time, and collisions that are graded and not only counted.
+Our choice, because Dimock & Selig 2003 name both as what their fitness lacks: no steady
+oscillation, a stable formation after a fixed time, and collisions that are graded and not only
+counted.
 """
 
 import math

@@ -1,7 +1,8 @@
 """Order, safety, union and connectivity of a swarm (Soria, Schiano and Floreano 2020, SwarmLab).
 
-Neighbours are all within metrics.r_comm, by true positions, so the graph is symmetric whatever a law or a radio makes
-of it. SwarmLab calls the radius of an agent r_coll; here metrics.r_coll is the distance of two centres, twice that.
+Neighbours are all within metrics.r_comm, by true positions, so the graph is symmetric whatever a
+law or a radio makes of it. SwarmLab calls the radius of an agent r_coll; here metrics.r_coll is the
+distance of two centres, twice that.
 """
 
 import math

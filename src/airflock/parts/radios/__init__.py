@@ -1,7 +1,7 @@
 """Layer 2: radios, one kind per file: plain rules for which packets arrive, when, and what is believed since.
 
-Copy the shape of `congestion.py` or, for links that remember, of `bursts.py` for a kind of your own; docs/radios.md
-shows one.
+Copy the shape of `congestion.py` or, for links that remember, of `bursts.py` for a kind of your
+own; docs/radios.md shows one.
 """
 
 import lazy_loader

@@ -1,7 +1,8 @@
 """Congestion: the more agents send within range of a receiver, the more packets meet in the air and are lost.
 
-Agents send without listening to each other (ALOHA, Abramson 1970): a packet survives where no other one begins within
-its vulnerable time, which of independent senders has the probability exp(-time · rate · others).
+Agents send without listening to each other (ALOHA, Abramson 1970): a packet survives where no other
+one begins within its vulnerable time, which of independent senders has the probability exp(-time ·
+rate · others).
 """
 
 import math

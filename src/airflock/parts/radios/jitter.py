@@ -1,7 +1,8 @@
 """Jitter: packets come later than the delay, by times that differ from packet to packet.
 
-A link carries one packet of a pair at a time: what is sent meanwhile is dropped, as by a sender that repeats a packet
-until it is acknowledged. So data grow older than the delay and its jitter alone.
+A link carries one packet of a pair at a time: what is sent meanwhile is dropped, as by a sender
+that repeats a packet until it is acknowledged. So data grow older than the delay and its jitter
+alone.
 """
 
 import math

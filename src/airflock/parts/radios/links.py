@@ -57,7 +57,8 @@ class Parameters(PacketParameters):
 def share(distance, near, far, received_near, received_far):
     """Received share over a distance (m) on a link that is near-perfect below `near` (m).
 
-    It falls linearly to received_far at `far` (m), then with the inverse square of the distance (signal power).
+    It falls linearly to received_far at `far` (m), then with the inverse square of the distance
+    (signal power).
     """
     middle = received_near + (received_far - received_near) / max(far - near, 1e-6) * (distance - near)
     beyond = received_far * far * far / max(distance * distance, far * far)

@@ -1,7 +1,8 @@
 """Shadow: buildings and obstacles between two agents weaken what they send each other.
 
-Reception falls with the power of the signal, which falls with a power of the distance (log-distance path loss). What
-stands in the way costs so many decibels, which is the same as a distance so many times as long.
+Reception falls with the power of the signal, which falls with a power of the distance (log-distance
+path loss). What stands in the way costs so many decibels, which is the same as a distance so many
+times as long.
 """
 
 from dataclasses import dataclass

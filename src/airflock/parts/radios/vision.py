@@ -1,8 +1,9 @@
 """Vision: an agent sees the others instead of hearing them, as bearings and distances with errors.
 
-What is seen is an offset from the observer. So errors of its own position do not come between the two, and nobody's
-own position, true or pretended, matters. A camera shows no velocity: it is estimated from one picture to the next by a
-fading-memory filter (Morrison 1969), whose gains follow from the time since the last picture and from one time.
+What is seen is an offset from the observer. So errors of its own position do not come between the
+two, and nobody's own position, true or pretended, matters. A camera shows no velocity: it is
+estimated from one picture to the next by a fading-memory filter (Morrison 1969), whose gains follow
+from the time since the last picture and from one time.
 """
 
 import math
@@ -105,8 +106,9 @@ def gains(since, smoothing):
 def see(dx, dy, dz, ex, ey, ez, evx, evy, evz, vx, vy, vz, since, g0, g1, g2, k):
     """Offset (m) and velocity (m/s) at which a neighbour is believed after a picture.
 
-    Of two axes across the line of sight the first is horizontal. Who is seen for the first time, or again after `hold`,
-    is believed to fly as the observer does; so is everybody after the observer's clock was put back.
+    Of two axes across the line of sight the first is horizontal. Who is seen for the first time, or
+    again after `hold`, is believed to fly as the observer does; so is everybody after the
+    observer's clock was put back.
     """
     level = math.sqrt(dx * dx + dy * dy)
     r = math.sqrt(level * level + dz * dz)

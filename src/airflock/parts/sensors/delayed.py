@@ -67,8 +67,8 @@ def bounds(s, period):
 def measure(x, y, z, vx, vy, vz, memory, period, s):
     """Position (m) and velocity (m/s) of `lag` ago, and Memory. At the start, the oldest state that there is.
 
-    Between two measurements positions follow the cubic polynomial that has both positions and both velocities
-    (Hermite), and velocities its slope: exact while the acceleration changes linearly.
+    Between two measurements positions follow the cubic polynomial that has both positions and both
+    velocities (Hermite), and velocities its slope: exact while the acceleration changes linearly.
     """
     m = memory
     back = min(s.lag / period, m.held)

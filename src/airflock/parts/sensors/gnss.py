@@ -13,8 +13,8 @@ OURS = "our choice"
 class Parameters(SensorParameters):
     """A satellite receiver. All standard deviations (SD) are per axis, and those of a stationary error.
 
-    The SD of a horizontal axis is sqrt(sd² + white² + bias²), apart from multipath and outages. A data sheet's CEP,
-    the radius of half of all fixes, is 1.18 of it.
+    The SD of a horizontal axis is sqrt(sd² + white² + bias²), apart from multipath and outages. A
+    data sheet's CEP, the radius of half of all fixes, is 1.18 of it.
     """
 
     sd: float = quantity(
@@ -86,9 +86,10 @@ def measure(
 ):  # fmt: skip
     """Position (m) and velocity (m/s) with the errors of the receiver, and its Memory.
 
-    The wandering error is a Gauss-Markov process: exp(-time / drift_time) is its autocorrelation, whatever the period.
-    Multipath and outages begin at their rates, as in a Poisson process, and last for their times. In an outage the
-    error grows by a velocity that is drawn when the fix is lost; with the fix the other errors are back.
+    The wandering error is a Gauss-Markov process: exp(-time / drift_time) is its autocorrelation,
+    whatever the period. Multipath and outages begin at their rates, as in a Poisson process, and
+    last for their times. In an outage the error grows by a velocity that is drawn when the fix is
+    lost; with the fix the other errors are back.
     """
     sound = memory.begun > 0.5  # at the first measurement, the drift is drawn from its stationary distribution
     keep = math.exp(-period / s.drift_time) if sound else 0.0

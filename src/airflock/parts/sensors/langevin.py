@@ -32,7 +32,8 @@ def exact(s):
 def error(dx, dv, g, period, s):
     """One period of an error along one axis: of the position dx (m), of the velocity dv (m/s), from a normal number g.
 
-    A damped oscillator with a random push (authors' program; the paper says only "Langevin, parabolic potential").
+    A damped oscillator with a random push (authors' program; the paper says only "Langevin,
+    parabolic potential").
     """
     push = math.sqrt(2.0 * s.damping * period * s.noise)
     spring = math.sqrt(2.0 * s.damping * s.noise) / s.scale

@@ -2,10 +2,11 @@
 
 One kind per file, each a plain function over rows.
 
-A kind is handed, of all others, their offsets as the agent believes them and the squares of their distances, FAR (1e30)
-of whom it does not hear; it fills a row with 1.0 for whom it meets. All is judged by what the agent knows: its own
-place as measured, the others' as heard. So a neighbour that was near a second ago, and is heard of only now, is near.
-Whom a kind lets through the law may still leave aside, by its own reach.
+A kind is handed, of all others, their offsets as the agent believes them and the squares of their
+distances, FAR (1e30) of whom it does not hear; it fills a row with 1.0 for whom it meets. All is
+judged by what the agent knows: its own place as measured, the others' as heard. So a neighbour that
+was near a second ago, and is heard of only now, is near. Whom a kind lets through the law may still
+leave aside, by its own reach.
 """
 
 import lazy_loader

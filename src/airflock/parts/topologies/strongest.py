@@ -1,9 +1,9 @@
 """The k strongest signals of those who are heard, by path loss over distance with log-normal fading.
 
-A signal loses 10 · exponent decibels with each tenfold distance, `wall` decibels behind something that stands in the
-world, and a normal number of `fading` decibels that is drawn for each pair and decision, the same both ways. On board
-nothing is drawn: there the distance and the map decide. All who are as strong as the k-th are met as well.
-Our definition.
+A signal loses 10 · exponent decibels with each tenfold distance, `wall` decibels behind something
+that stands in the world, and a normal number of `fading` decibels that is drawn for each pair and
+decision, the same both ways. On board nothing is drawn: there the distance and the map decide. All
+who are as strong as the k-th are met as well. Our definition.
 """
 
 import math

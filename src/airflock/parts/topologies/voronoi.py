@@ -1,12 +1,14 @@
 """Neighbours by Voronoi cells in a plane: those whose cell shares an edge with the own one.
 
-A point x lies nearer to the agent than to a neighbour at offset d where x · d ≤ d · d / 2. The cell is where this holds
-for all, and its polar dual is the convex hull of the agent itself (0) and of the inverted offsets d / (d · d): whoever
-is a corner of that hull bounds the cell, also where the cell is open to infinity. The hull is wrapped from one corner
-to the next (Jarvis 1973), so that no polygon is kept and cells without end need no box around them.
+A point x lies nearer to the agent than to a neighbour at offset d where x · d ≤ d · d / 2. The cell
+is where this holds for all, and its polar dual is the convex hull of the agent itself (0) and of
+the inverted offsets d / (d · d): whoever is a corner of that hull bounds the cell, also where the
+cell is open to infinity. The hull is wrapped from one corner to the next (Jarvis 1973), so that no
+polygon is kept and cells without end need no box around them.
 
-Who shares but a corner of a cell, as four on one circle do, is not met: an inverted offset within STRAIGHT (rad) of a
-side of the hull is no corner. Those at the very same place are met together. Each is taken at its nearest image.
+Who shares but a corner of a cell, as four on one circle do, is not met: an inverted offset within
+STRAIGHT (rad) of a side of the hull is no corner. Those at the very same place are met together.
+Each is taken at its nearest image.
 """
 
 from airflock.parts.topologies.ranking import HEARD_LIMIT

@@ -1,10 +1,11 @@
 """Tracks of others: one reader per format, one set of checks, one time grid, and the door `load_tracks`.
 
-A reader is a function in a file of this folder, or of the folder `readers` of an installed package that declares the
-entry point `airflock.parts`. Its decorator declares which files it reads, and no list names it:
+A reader is a function in a file of this folder, or of the folder `readers` of an installed package
+that declares the entry point `airflock.parts`. Its decorator declares which files it reads, and no
+list names it:
 
-    @reader("my log", suffixes=(".mylog",), sniff=lambda start: start.startswith(b"MYLOG"))
-    def read_my_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    @reader("my log", suffixes=(".mylog",), sniff=lambda start: start.startswith(b"MYLOG")) def
+    read_my_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
         '''Time and place of each bird.'''
 """
 
@@ -49,7 +50,8 @@ def reader(
     """Declare a reader of files; all but `sniff` is written literally, since it is read without running the file.
 
     name     : of the format; suffixes : endings of its files, in small letters
-    sniff    : returns True for the first bytes of a file of this format: it then reads files of any ending
+    sniff    : returns True for the first bytes of a file of this format: it then reads files of any
+               ending
     needs    : packages beside those of Airflock, with their licences
     """
 

@@ -92,8 +92,9 @@ def _tracks(where: str, names: list[str], time: Any, arrays: dict[str, tuple[Any
 def _is_heading(values: Any) -> bool:
     """Return True if the third number of places (frame, individual, 3) is the direction of motion in the plane.
 
-    It is, in radians or degrees, from any axis and turning either way, if course and angle stay together while they
-    change. An angle that nobody moves by, as of an animal that waits, jumps by a whole turn now and then.
+    It is, in radians or degrees, from any axis and turning either way, if course and angle stay
+    together while they change. An angle that nobody moves by, as of an animal that waits, jumps by
+    a whole turn now and then.
     """
     moved, third = np.diff(values[..., :2], axis=0), values[:-1, :, 2]
     far = np.linalg.norm(moved, axis=2)
@@ -142,8 +143,9 @@ def _numbers(array: Any, where: str) -> Any:
 @reader("arrays of NumPy", suffixes=(".npy", ".npz"))
 def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """(frame, individual, 2 or 3), with `--fps` and `--unit`. Of several arrays that of `positions, position,
-    trajectories, pos, xyz, xy, tracks` is read, or `x` and `y` together; a note says which. Otherwise write
-    `--map position:=NAME`.
+    trajectories, pos, xyz, xy,
+    tracks` is read, or `x` and `y` together; a note says which. Otherwise write `--map
+    position:=NAME`.
     """
     try:
         with path.open("rb") as file:

@@ -39,10 +39,12 @@ def _track(name: str, path: Path, time: Any, columns: dict[str, Any], rows: Any,
 @reader("PX4 ULog", suffixes=(".ulg",), needs="pyulog (BSD-3)")
 def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """`vehicle_local_position`; the command is `trajectory_setpoint.velocity` (both generations of its fields); clock
-    from `vehicle_gps_position`; in the air from `vehicle_land_detected`; split where `xy_reset_counter` changes.
+    from `vehicle_gps_position`; in the air from `vehicle_land_detected`; split where
+    `xy_reset_counter` changes.
 
-    The set-point is the request of the companion; vehicle_local_position_setpoint is the controller's own output and is
-    not read. Rows where the estimator calls its position invalid are left out.
+    The set-point is the request of the companion; vehicle_local_position_setpoint is the
+    controller's own output and is not read. Rows where the estimator calls its position invalid are
+    left out.
     """
     try:
         from pyulog import ULog
@@ -129,11 +131,12 @@ LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so 
 )  # fmt: skip
 def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """`PSCN, PSCE, PSCD` by field names (position, velocity), `ORGN`, `GPS`. The command is `GUIP` in its own unit, the
-    velocity that GUIDED mode was sent. Of planes, rovers and older releases `XKF1`, else `NKF1`, `POS` or `GPS`,
-    without commands; a note says which.
+    velocity that GUIDED mode was sent. Of planes, rovers and older releases `XKF1`, else `NKF1`,
+    `POS` or `GPS`, without commands; a note says which.
 
-    TVN, TVE, TVD are no commands: they are what the position controller makes of GUIP within its limits of acceleration
-    and jerk, so that a response to them looks eight times as quick as that to a command.
+    TVN, TVE, TVD are no commands: they are what the position controller makes of GUIP within its
+    limits of acceleration and jerk, so that a response to them looks eight times as quick as that
+    to a command.
     """
     _need_pymavlink(path)
     contents = ReaderProcess(path, read_dataflash_arrays, "a DataFlash log", pace=PACE).answer(options.done)
@@ -220,7 +223,8 @@ def _guided_velocities(guided: NDArray[np.float64]) -> NDArray[np.float64]:
 def _add_commands(track: ImportedTrack, at: Any, commands: Any, findings: ImportReport, name: str) -> None:
     """Add the command in force at each row: the last one, unless it is so old that the autopilot has given it up.
 
-    at, commands : times (s, of the track's clock) and velocities east, north, up (m/s); name : of these messages
+    at, commands : times (s, of the track's clock) and velocities east, north, up (m/s); name : of
+                   these messages
     """
     order = np.argsort(at, kind="stable")
     at, last = at[order], np.searchsorted(at[order], track.time, side="right") - 1
@@ -243,7 +247,8 @@ def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
     """`LOCAL_POSITION_NED` of each vehicle, velocities of `POSITION_TARGET_LOCAL_NED` as its command; rows have the
     vehicle's own time, put on the receiver's clock.
 
-    A row is put on that clock by `time_boot_ms`, not by its arrival. Positions are about their own origins.
+    A row is put on that clock by `time_boot_ms`, not by its arrival. Positions are about their own
+    origins.
     """
     _need_pymavlink(path)
     contents = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
@@ -375,11 +380,12 @@ CLOCK_GAIN = 0.05  # share of the difference to the ticks that each row takes ba
 )  # fmt: skip
 def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Place and velocity as the autopilot sent them, at its own time put on the node's clock, and what the node
-    commanded, in east-north-up of the mission. Without the autopilot's bytes the time is reckoned from the steps.
+    commanded, in east-north-up of the mission. Without the autopilot's bytes the time is reckoned
+    from the steps.
 
-    A row is a tick at which the own state was another than at the tick before, at the time at which the state held, not
-    that of the tick. Commands are those of phases in which the node flies; the log's first line relates their clock to
-    UTC.
+    A row is a tick at which the own state was another than at the tick before, at the time at which
+    the state held, not that of the tick. Commands are those of phases in which the node flies; the
+    log's first line relates their clock to UTC.
     """
     try:
         log = read_log_ticks(path)

@@ -289,7 +289,8 @@ def drop_corrupt_times(track: ImportedTrack, findings: ImportReport) -> None:
 def _question_units(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Ask for units where nobody has named them and rows show others; of times note what was assumed.
 
-    Rates and speeds judge all units by one measure: what no animal, robot or camera does is another unit.
+    Rates and speeds judge all units by one measure: what no animal, robot or camera does is another
+    unit.
     """
     some = [(track, slice(0, 10_000)) for track in tracks if len(track.time) > 1]
     if not some:

@@ -35,9 +35,9 @@ PoseColumns = dict[str, dict[str, dict[str, str]]]  # individual → keypoint �
 @reader("table", suffixes=(".csv", ".tsv", ".txt"))
 def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """A long table with `id`, one file per individual, or a pair of columns for each: `time, x1, y1, x2, y2, ...`,
-    `time, fish1_x, fish1_y, ...`. Columns are separated by commas, semicolons, tabs, bars or blanks. Lines above the
-    names are left out, whether or not they begin with `#` (EthoVision, NetLogo's BehaviorSpace); a row of units below
-    the names is read (EthoVision, TrackMate).
+    `time, fish1_x, fish1_y, ...`. Columns are separated by commas, semicolons, tabs, bars or
+    blanks. Lines above the names are left out, whether or not they begin with `#` (EthoVision,
+    NetLogo's BehaviorSpace); a row of units below the names is read (EthoVision, TrackMate).
     """
     head = read_head(path, options)
     findings.notes += [f"{path}: {note}" for note in head.notes]
@@ -446,8 +446,10 @@ SEPARATOR = re.compile(r'"?sep=.?"?', re.IGNORECASE)  # such a line, which sprea
 class TableHead(NamedTuple):
     """The beginning of a text table.
 
-    above    : number of lines above its names, or above its first row where the names do not stand in one line above it
-    named    : whether `names` stand in no such line: NumPy writes them in a remark, trackers in several lines
+    above    : number of lines above its names, or above its first row where the names do not stand
+               in one line above it
+    named    : whether `names` stand in no such line: NumPy writes them in a remark, trackers in
+               several lines
     trailing : whether rows end with a delimiter, and the names do not
     pose     : individual → keypoint → component → column, of DeepLabCut
     """

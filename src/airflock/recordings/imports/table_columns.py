@@ -362,7 +362,8 @@ class Source(NamedTuple):
     """Where a quantity is read.
 
     tree  : an expression of columns; factor : of its values to SI
-    label : the user's word for it, which can stand in further expressions; bare : whether nobody has named its unit
+    label : the user's word for it, which can stand in further expressions; bare : whether nobody
+            has named its unit
     """
 
     tree: ast.expr

@@ -58,7 +58,8 @@ class ImportOptions:
 class RowFlag(NamedTuple):
     """Meaning of a column that says which rows count: those of `least` or more, also where `sign` times it is meant.
 
-    words : of rows that do not count; `receiver` and `used` name receivers or filters of one drone, of which one counts
+    words : of rows that do not count; `receiver` and `used` name receivers or filters of one drone,
+            of which one counts
     numbers : of receivers that have names, by name
     """
 
@@ -75,10 +76,12 @@ class ImportedTrack:
 
     name, source : the individual and its file, for messages
     time    : (row,) s, of the clock that `clock` names
-    columns : target → (row,) m, m/s, degrees; position, velocity and command as far as the file has them
+    columns : target → (row,) m, m/s, degrees; position, velocity and command as far as the file has
+              them
     rows    : (row,) number of the row in the file, for messages
     labels  : target → the column or topic that it was read from
-    clock   : "utc", "boot" (since this device was switched on), "own" (of this file) or "shared" (by all in the file)
+    clock   : "utc", "boot" (since this device was switched on), "own" (of this file) or "shared"
+              (by all in the file)
     utc     : (k, 2) own time and UTC, s, where the file has both
     datum   : what heights are above: "", "amsl", "ellipsoid" or "home"
     origin  : latitude, longitude (degrees) and height (m) of x = y = z = 0, if known
@@ -86,8 +89,10 @@ class ImportedTrack:
     unnamed : targets whose unit nobody has named
     ground  : whether its axes are known to point east and north
     air     : (row,) whether it was in the air; None if the file does not tell
-    breaks  : rows at which the estimator was reset, so that positions before and after do not belong together
-    flags   : column → what it says of rows, and its (row,) values; `track_checks.drop_rejected_rows` takes them
+    breaks  : rows at which the estimator was reset, so that positions before and after do not
+              belong together
+    flags   : column → what it says of rows, and its (row,) values;
+              `track_checks.drop_rejected_rows` takes them
     """
 
     name: str

@@ -452,8 +452,9 @@ def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64]
 def _likeness(moved: Array, summed: Array) -> tuple[NDArray[np.bool_], Array, Array]:
     """Correlate displacements with the same from velocities, both (pair, axis), m; some velocity must vary.
 
-    Returns (axis,) whether the motion along it varies enough to compare, and more than the noise of the positions;
-    (axis, axis) correlation; (axis,) by how many times the displacement along it changes as the velocity says.
+    Returns (axis,) whether the motion along it varies enough to compare, and more than the noise of
+    the positions; (axis, axis) correlation; (axis,) by how many times the displacement along it
+    changes as the velocity says.
     """
     strength, spread = summed.std(axis=0), moved.std(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -566,8 +567,10 @@ class Step(NamedTuple):
     """One step that the motion of its track does not explain.
 
     row  : after it, in the track; number : of that row in the file; time : of that row, s
-    size : what is not explained, m; meant, place : (2,) where the track should be after it, and is, m
-    kind : "jump"; "motion" where a living thing could move so; "gap" where rows are missing in between; "small"
+    size : what is not explained, m; meant, place : (2,) where the track should be after it, and is,
+           m
+    kind : "jump"; "motion" where a living thing could move so; "gap" where rows are missing in
+           between; "small"
     """
 
     row: int
@@ -608,8 +611,8 @@ def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 def _rivals(tracks: list[ImportedTrack], steps: list[list[Step]]) -> dict[tuple[int, int], str]:
     """Return individual and row → name of the one who should be there, of identities that are exchanged.
 
-    Chance may bring one individual to where another one should be, but not both at an instant: such steps are told from
-    motion by the noise alone, however near the two are.
+    Chance may bring one individual to where another one should be, but not both at an instant: such
+    steps are told from motion by the noise alone, however near the two are.
     """
     late = 0.1 * min((median_period(track) for track in tracks), default=0.0)
     every = sorted(((step.time, who, step) for who, own in enumerate(steps) for step in own), key=lambda one: one[:2])
@@ -708,7 +711,8 @@ def _alive(moved: Array, steps: Array) -> Array:
 def _outliers(jumps: NDArray[np.int64], moved: Array, speed: Array) -> NDArray[np.int64]:
     """Return rows off the track: between two that agree, so that the next step undoes the jump to it.
 
-    jumps : rows before a jump; moved : (row - 1, 2) of which one undoes the other, m; speed : as in `_alive`
+    jumps : rows before a jump; moved : (row - 1, 2) of which one undoes the other, m; speed : as in
+            `_alive`
     """
     if not jumps.size:
         return jumps

@@ -33,8 +33,10 @@ Ring = list[tuple[float, float]]
 class Outline:
     """One shape of a file: its name, its rings in degrees (longitude, latitude), and heights (m) that it gives.
 
-    shape : of one that is no polygon, and so is left out: what it is; `shell` holds the points of a line
-    parts : number of the MultiPolygon or MultiGeometry that it is a part of; 0 of one that stands alone
+    shape : of one that is no polygon, and so is left out: what it is; `shell` holds the points of a
+            line
+    parts : number of the MultiPolygon or MultiGeometry that it is a part of; 0 of one that stands
+            alone
     solid : it must not be entered, and is no arena even if it is the largest
     """
 

@@ -117,7 +117,8 @@ class Shape(NamedTuple):
 
     rows     : its numbers → rows with their bounds
     distance : scalar rule: position (m) and numbers → distance (m) and the unit vector away
-    ray      : scalar rule: position (m), direction and numbers → distance (m); None where the bounds say all
+    ray      : scalar rule: position (m), direction and numbers → distance (m); None where the
+               bounds say all
     plan     : row → ground plan, a line (point, 2), m
     lines    : row → edges in space, lines (point, 3), m
     mesh     : rows → vertices (vertex, 3), m, and triangles (face, 3) of all of them together
@@ -339,7 +340,8 @@ def scene_of(
 ) -> Scene:
     """Scene as arrays; in a plane every building and tree is its ground plan.
 
-    polygons : walls besides, m; heights: lowest and highest of the last of them, if they have ends in height, m
+    polygons : walls besides, m; heights: lowest and highest of the last of them, if they have ends
+               in height, m
     """
     tall = len(polygons) - len(heights)
     walls = [

@@ -1,18 +1,20 @@
 """Prey that swarm and flee, and predators that hunt them (Chen and Kolokolnikov 2014).
 
-Each prey is driven away from its fellows as 1/r, towards them as r, and away from predators as 1/r. A predator is drawn
-to all prey, to those that are near the most. There is no inertia. A weak predator stops in the middle of a ring of
-prey, which confuse it; a stronger one chases the swarm, which opens before it and closes behind it.
+Each prey is driven away from its fellows as 1/r, towards them as r, and away from predators as 1/r.
+A predator is drawn to all prey, to those that are near the most. There is no inertia. A weak
+predator stops in the middle of a ring of prey, which confuse it; a stronger one chases the swarm,
+which opens before it and closes behind it.
 
-Who is prey and who is a predator is said by groups: `role` is a choice, and each takes those of its own group for its
-kind and all others for the other kind.
+Who is prey and who is a predator is said by groups: `role` is a choice, and each takes those of its
+own group for its kind and all others for the other kind.
 
 Differences
 -----------
-The paper's lengths and times have no units; here metres and seconds, and the repulsion has a strength of its own, which
-is 1 in the paper. The paper has one predator; of several each drives prey away by itself, and they do not notice each
-other. Where the paper divides by the number of all prey, an agent divides by that of the prey it meets, itself among
-them. Nobody flies faster than `v_max`, which the paper does not limit.
+The paper's lengths and times have no units; here metres and seconds, and the repulsion has a
+strength of its own, which is 1 in the paper. The paper has one predator; of several each drives
+prey away by itself, and they do not notice each other. Where the paper divides by the number of all
+prey, an agent divides by that of the prey it meets, itself among them. Nobody flies faster than
+`v_max`, which the paper does not limit.
 """
 
 from dataclasses import dataclass

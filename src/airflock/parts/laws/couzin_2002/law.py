@@ -1,14 +1,16 @@
 """Collective memory and spatial sorting in animal groups (Couzin et al. 2002), Eqs 1-3.
 
-Three zones, one around the other: repulsion within r_r goes before everything; else alignment with those in the zone
-of orientation and attraction to those in the zone of attraction, half and half. Nobody sees behind. As the zone of
-orientation widens, a group passes from swarm to torus to dynamic and highly parallel motion.
+Three zones, one around the other: repulsion within r_r goes before everything; else alignment with
+those in the zone of orientation and attraction to those in the zone of attraction, half and half.
+Nobody sees behind. As the zone of orientation widens, a group passes from swarm to torus to dynamic
+and highly parallel motion.
 
 Differences
 -----------
-Units are body lengths and seconds in the paper; here metres. The random direction error, a wrapped Gaussian on
-the sphere, is a Gaussian of width sigma on each axis, made a unit vector again: equal to first order at 0.05 rad.
-Where nobody is in any zone, or the vectors cancel, the heading is kept. The turning rate is the body's: body.turn.
+Units are body lengths and seconds in the paper; here metres. The random direction error, a wrapped
+Gaussian on the sphere, is a Gaussian of width sigma on each axis, made a unit vector again: equal
+to first order at 0.05 rad. Where nobody is in any zone, or the vectors cancel, the heading is kept.
+The turning rate is the body's: body.turn.
 """
 
 import math

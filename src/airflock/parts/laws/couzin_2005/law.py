@@ -1,18 +1,19 @@
 """Effective leadership and decision-making in animal groups on the move (Couzin et al. 2005).
 
-Who is nearer than alpha is avoided, before everything else. Otherwise an animal turns towards those within rho and
-along them and itself, one unit vector each. A few are informed: they add to that a direction which they prefer, with
-the weight omega. Nobody knows who is informed. A group is led so, the more exactly the more are informed, and a large
-group by a smaller share of them.
+Who is nearer than alpha is avoided, before everything else. Otherwise an animal turns towards those
+within rho and along them and itself, one unit vector each. A few are informed: they add to that a
+direction which they prefer, with the weight omega. Nobody knows who is informed. A group is led so,
+the more exactly the more are informed, and a large group by a smaller share of them.
 
-Who is informed is said by groups: omega and direction are numbers of theirs, and omega is 0 for all others.
+Who is informed is said by groups: omega and direction are numbers of theirs, and omega is 0 for all
+others.
 
 Differences
 -----------
-The paper's text was not at hand; numbers are as its model is commonly told. Its lengths have no unit; here metres. The
-preferred direction is added where nobody is avoided. The random error of the direction is a Gaussian of width sigma on
-each axis, made a unit vector again. Where vectors cancel, the heading is kept. The turning rate is the body's:
-body.turn.
+The paper's text was not at hand; numbers are as its model is commonly told. Its lengths have no
+unit; here metres. The preferred direction is added where nobody is avoided. The random error of the
+direction is a Gaussian of width sigma on each axis, made a unit vector again. Where vectors cancel,
+the heading is kept. The turning rate is the body's: body.turn.
 """
 
 import math

@@ -1,16 +1,19 @@
 """Emergent behavior in flocks (Cucker and Smale 2007): everybody's velocity is drawn towards everybody else's.
 
-The pull falls with distance as (1 + r²/sigma²)^-beta. The mean velocity is kept. If the pull falls slowly, beta up to
-1/2, any flock ends at one velocity and stays together, however it starts; if it falls faster, that depends on the start
-(the paper for beta < 1/2; Ha and Liu 2009 for 1/2, too). There is no repulsion.
+The pull falls with distance as (1 + r²/sigma²)^-beta. The mean velocity is kept. If the pull falls
+slowly, beta up to 1/2, any flock ends at one velocity and stays together, however it starts; if it
+falls faster, that depends on the start (the paper for beta < 1/2; Ha and Liu 2009 for 1/2, too).
+There is no repulsion.
 
 Differences
 -----------
-The text was not at hand: the law is as it is quoted everywhere. The paper's weight is K / (sigma² + r²)^beta; here K is
-the weight of a neighbour at no distance, K / sigma^(2 beta) there, so that it has a unit.
+The text was not at hand: the law is as it is quoted everywhere. The paper's weight is K / (sigma² +
+r²)^beta; here K is the weight of a neighbour at no distance, K / sigma^(2 beta) there, so that it
+has a unit.
 
-ours: with p_speed an agent also approaches v_flock along its own velocity; 0, the default, is the paper. Without it a
-flock that starts in all directions comes to rest, for its mean velocity is next to nothing.
+ours: with p_speed an agent also approaches v_flock along its own velocity; 0, the default, is the
+paper. Without it a flock that starts in all directions comes to rest, for its mean velocity is next
+to nothing.
 """
 
 from dataclasses import dataclass

@@ -1,21 +1,26 @@
 """Boids that feel the drag (Dimock & Selig 2003): cohesion, collision avoidance, and down the gradient of induced drag.
 
-Every bird knows where all others are; the velocity demands of the three rules are added and obeyed at once (Eq. 9), in
-a frame that flies along with the air. Induced drag and its gradient come from one lifting-line solution per flock.
+Every bird knows where all others are; the velocity demands of the three rules are added and obeyed
+at once (Eq. 9), in a frame that flies along with the air. Induced drag and its gradient come from
+one lifting-line solution per flock.
 
 Differences
 -----------
-The paper survives as a damaged scan; Eqs 1 and 2 are reconstructions, fitted to what it says its controller does.
+The paper survives as a damaged scan; Eqs 1 and 2 are reconstructions, fitted to what it says its
+controller does.
 
 * Eq. 1 shows X over |X| and a bracket. `cohesion`: C1 K (|X|/R)² (default), C3 K (1 - exp(-(|X|/R)²)) and C7
-  K (exp((|X|/R)²) - 1) agree for small |X| and are the only forms under which the published gains survive; kept for
-  comparison: C0 K exp((|X|/R)²), C2 K |X|/R, and with K in 1/s C5 K |X| and C6 K |X| exp(-(|X|/R)²).
+  K (exp((|X|/R)²) - 1) agree for small |X| and are the only forms under which the published gains
+  survive; kept for comparison: C0 K exp((|X|/R)²), C2 K |X|/R, and with K in 1/s C5 K |X| and C6 K
+  |X| exp(-(|X|/R)²).
 * Eq. 2: positions are taken relative to the bird (the paper is silent); `centroid` divides their weighted sum by n
   (default: only so do the published gains hold a V), by the n - 1 others, or by the sum of weights.
 * Eq. 4 as printed has no direction between two symmetric neighbours, and full strength towards birds at infinity;
-  `avoidance` offers it weighted by presence, summed over pairs, and as a barrier that grows without bound.
+  `avoidance` offers it weighted by presence, summed over pairs, and as a barrier that grows without
+  bound.
 * Eq. 8: `gradient` is the paper's central difference over one grid cell with all circulations solved again (cells), the
-  same with the others' circulations held (cells_frozen, four times faster), or analytic (analytic, frozen), or none.
+  same with the others' circulations held (cells_frozen, four times faster), or analytic (analytic,
+  frozen), or none.
 * `steps = snapped` moves birds by whole cells of the grid: one reading of "P and Q are constrained to a grid".
 * The system is linear and solved so: the paper's fitness of -1000 for divergence never occurs.
 """

@@ -1,10 +1,11 @@
 """Formation: every drone flies to a point of its own and keeps its distance, for displays of many drones. Ours.
 
-Kidger's second wish ("a master node that assigns different goals to each boid"). The goals of all drones are under way
-for the same time (`world.goals.glide`); towards its own a drone flies as fast as a braking curve allows. Neighbours
-push it away like half a spring and pull its velocity towards theirs where a braking curve would be exceeded: rules of
-Vásárhelyi et al. 2018, with ranges below the distance of two points. Obstacles and drones that hover push, and to one
-side, so that nobody waits behind them.
+Kidger's second wish ("a master node that assigns different goals to each boid"). The goals of all
+drones are under way for the same time (`world.goals.glide`); towards its own a drone flies as fast
+as a braking curve allows. Neighbours push it away like half a spring and pull its velocity towards
+theirs where a braking curve would be exceeded: rules of Vásárhelyi et al. 2018, with ranges below
+the distance of two points. Obstacles and drones that hover push, and to one side, so that nobody
+waits behind them.
 """
 
 from dataclasses import dataclass

@@ -1,19 +1,23 @@
 """Kidger, An Investigation into Drone Swarms & Swarm Intelligence: oracles, five ways to recombine them, ray casts.
 
-Each oracle suggests a movement (m/s); a recombination scheme makes one of them. Order of importance: obstacle
-avoidance, separation, cohesion, alignment, goal, previous movement. The thesis counts Unity units and frames; 1 unit
-is 1 m here and a second has 60 frames.
+Each oracle suggests a movement (m/s); a recombination scheme makes one of them. Order of
+importance: obstacle avoidance, separation, cohesion, alignment, goal, previous movement. The thesis
+counts Unity units and frames; 1 unit is 1 m here and a second has 60 frames.
 
-Differences from the thesis, each because its text leaves the point open or its listing contradicts its text:
+Differences from the thesis, each because its text leaves the point open or its listing contradicts
+its text:
 * Separation from several neighbours adds their inverse vectors -d, a metre being a metre per frame (the listing returns
-  that of the first neighbour it finds); method = "turn" adds the turned headings, at p.speed. separation = "normalised"
-  adds -d / d² and suggests p.speed that way: opposed by cohesion it cancels at any distance, and boids meet.
+  that of the first neighbour it finds); method = "turn" adds the turned headings, at p.speed.
+  separation = "normalised" adds -d / d² and suggests p.speed that way: opposed by cohesion it
+  cancels at any distance, and boids meet.
 * Cohesion and goal suggest movements at p.speed towards a point. The listing of cohesion returns the bare offset of up
-  to 40 m, beside a cap of 1 m per frame (cohesion = "printed"): goal and alignment are then cut off.
+  to 40 m, beside a cap of 1 m per frame (cohesion = "printed"): goal and alignment are then cut
+  off.
 * Cohesion goes to the mean position as the text says; the listing has the sign reversed and divides by the neighbours
   without the agent itself. Alignment divides by the number of neighbours in the sum.
 * The ray ahead lies along what the other oracles suggest together, as the comment of the 3-D listing says, so that
-  nothing is flown that was not looked at; ahead = "movement" casts along the own movement, as the 2-D listing does.
+  nothing is flown that was not looked at; ahead = "movement" casts along the own movement, as the
+  2-D listing does.
 * The cast is one of a sphere (radius + margin) against everything, and the nearest hit counts (the thesis's bug 2 was
   the first edge found); cast = "thin" is the thesis's ray.
 * Where no ray is free the longest is flown, no farther than it is free; the thesis suggests nothing then.
@@ -144,7 +148,8 @@ def sight(p):
 def turned_away(dx, dy, dz, r, hx, hy, hz, p):
     """Own heading, turned away from a neighbour by an angle that grows as it nears (separation 1, section 4.1.1).
 
-    The angle is (1 - d/r_sep) 2 pi 0.05 pi, with d (m) from surface to surface: about 0.99 rad at contact.
+    The angle is (1 - d/r_sep) 2 pi 0.05 pi, with d (m) from surface to surface: about 0.99 rad at
+    contact.
     """
     apart = max(r - 2.0 * p.radius, 0.0)
     angle = (1.0 - apart / p.r_sep) * 0.1 * math.pi * math.pi

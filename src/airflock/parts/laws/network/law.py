@@ -1,7 +1,8 @@
 """A small neural network as a law: a policy that was trained elsewhere flies, is certified and goes on board. Ours.
 
-Each layer has up to 18 units, tanh but for the last one, whose three outputs are the desired velocity in units of
-v_flock. A network sees 18 numbers, without units, in axes of its own: along its horizontal heading, to its left, up.
+Each layer has up to 18 units, tanh but for the last one, whose three outputs are the desired
+velocity in units of v_flock. A network sees 18 numbers, without units, in axes of its own: along
+its horizontal heading, to its left, up.
 
 | input | what it is |
 |---|---|
@@ -13,8 +14,9 @@ v_flock. A network sees 18 numbers, without units, in axes of its own: along its
 | 12-14 | sum of normal (1 - distance / r) over the walls and obstacles nearer than r |
 | 15-17 | direction to the goal, times its distance over r where that is below 1 |
 
-`airflock.network_weights` makes the column `model.weights` of layers of any width up to 18. Without weights an agent
-flies by one layer that keeps its heading, aligns, keeps its distance and turns from walls.
+`airflock.network_weights` makes the column `model.weights` of layers of any width up to 18. Without
+weights an agent flies by one layer that keeps its heading, aligns, keeps its distance and turns
+from walls.
 """
 
 import math

@@ -1,17 +1,19 @@
 """Flocking of a lattice of double integrators (Olfati-Saber 2006): alpha-lattice, beta agents, gamma agent.
 
-Neighbours pull and push an agent towards the distance d, and their velocities draw its own (alpha). A wall or an
-obstacle is a neighbour at its nearest point that moves along its surface (beta). The agent follows a virtual leader,
-the gamma agent: the goal of the flock (`[goals]`).
+Neighbours pull and push an agent towards the distance d, and their velocities draw its own (alpha).
+A wall or an obstacle is a neighbour at its nearest point that moves along its surface (beta). The
+agent follows a virtual leader, the gamma agent: the goal of the flock (`[goals]`).
 
 Differences
 -----------
-The text was not at hand. The functions are those that the paper's followers print and program alike; the numbers d, r,
-d', epsilon, a, b and h are those of a public program that names Section VIII (OptFlock, Montanari et al. 2025). Gains
-c1 are our choice, and c2 = 2 sqrt(c1) is the paper's. Lengths have no unit there; here they count in `unit`, 1 m.
+The text was not at hand. The functions are those that the paper's followers print and program
+alike; the numbers d, r, d', epsilon, a, b and h are those of a public program that names Section
+VIII (OptFlock, Montanari et al. 2025). Gains c1 are our choice, and c2 = 2 sqrt(c1) is the paper's.
+Lengths have no unit there; here they count in `unit`, 1 m.
 
 * The velocity of the gamma agent is not perceived. Its speed is v_gamma, its direction the agent's own: the same where
-  all follow it, and with v_gamma = 0 the static rendezvous of the paper. Without a goal v_gamma alone is kept.
+  all follow it, and with v_gamma = 0 the static rendezvous of the paper. Without a goal v_gamma
+  alone is kept.
 * The curvature of an obstacle is not perceived either: the speed of its beta agent is that along a flat wall (mu = 1).
 * Behind a surface an agent is pushed as before it, so that it does not stay inside.
 """

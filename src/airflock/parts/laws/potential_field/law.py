@@ -1,14 +1,15 @@
 """Artificial potential field, the textbook's: a goal that draws, obstacles that push, neighbours at a distance. Ours.
 
-The goal and the obstacles are those of Khatib 1986: the velocity that a quadratic potential wants, cut to a largest
-speed, with damping; and a push that grows without limit at a surface and ends at a distance from it. Neighbours are
-those of Leonard and Fiorelli 2001: a logarithmic potential with its minimum at d_0, cut off at d_1.
+The goal and the obstacles are those of Khatib 1986: the velocity that a quadratic potential wants,
+cut to a largest speed, with damping; and a push that grows without limit at a surface and ends at a
+distance from it. Neighbours are those of Leonard and Fiorelli 2001: a logarithmic potential with
+its minimum at d_0, cut off at d_1.
 
 Differences
 -----------
-The texts were not at hand; both potentials are as textbooks print them. Without a goal an agent keeps v_max along its
-own velocity. Nothing aligns velocities, so this is the law that others are compared with. Pushes are counted no nearer
-than r_min, and the whole acceleration is at most a_max.
+The texts were not at hand; both potentials are as textbooks print them. Without a goal an agent
+keeps v_max along its own velocity. Nothing aligns velocities, so this is the law that others are
+compared with. Pushes are counted no nearer than r_min, and the whole acceleration is at most a_max.
 """
 
 from dataclasses import dataclass

@@ -1,22 +1,26 @@
 """Boids (Reynolds 1987) in the form that Zapotecatl et al. 2016 measured: cohesion, separation, alignment, walls ahead.
 
-Each boid steers by a force: towards the mean position of those within r_c (Eq. 5), away from those within r_s (Eq. 6)
-and towards the mean velocity of those within r_a (Eq. 7). A wall seen within one second of flight replaces flocking.
+Each boid steers by a force: towards the mean position of those within r_c (Eq. 5), away from those
+within r_s (Eq. 6) and towards the mean velocity of those within r_a (Eq. 7). A wall seen within one
+second of flight replaces flocking.
 
 Differences
 -----------
-paper → the authors' program, which decides here because the printed equations cannot produce the printed figures;
-`form = "printed"` is Eqs 2-10 as they stand (quality then stays below 0.76 instead of 0.93):
+paper → the authors' program, which decides here because the printed equations cannot produce the
+printed figures; `form = "printed"` is Eqs 2-10 as they stand (quality then stays below 0.76 instead
+of 0.93):
 
 * Eqs 5-7 are vectors of any length; the program takes unit vectors, and separation falls with 1/d, not rises with d.
 * Eq. 4 has d < r; in the program any neighbour nearer than 1.5 cm acts in every behaviour (`r_floor`), even for r = 0.
 * Eq. 10 is used directly; the program smooths the acceleration by k = clip(9 dt, 0.15, 0.4) at each step.
 * Field of view: Eq. 4 compares the angle with theta; here theta is the full angle, seen up to half of it (360°: all).
 * The wall rule is in the program only: a ray ahead, shorter than one second of flight, steers sideways to the centre.
-  A boid clamped exactly on a face that heads inwards avoids it in the program for one frame; not here.
+  A boid clamped exactly on a face that heads inwards avoids it in the program for one frame; not
+  here.
 * Order of updates, dt and the pond's faces: `update`, `dt`, `world.edges` of the preset.
 
-ours: force, mass and weights in SI. In the program's form a weight counts forces of f_unit: 1 cm/s² times a mass of 1.
+ours: force, mass and weights in SI. In the program's form a weight counts forces of f_unit: 1 cm/s²
+times a mass of 1.
 """
 
 import math

@@ -1,18 +1,19 @@
 """Steering behaviors for autonomous characters (Reynolds 1999): separation, cohesion, alignment, and a turn limit.
 
-An agent is the paper's simple vehicle: forces steer it, cut off at a largest one, and it has a largest speed.
-Separation pushes from neighbours by 1/r, cohesion pulls to their mean position, alignment to their mean velocity, each
-within its own radius and field of view. Containment looks ahead and steers back from where the agent would be outside.
+An agent is the paper's simple vehicle: forces steer it, cut off at a largest one, and it has a
+largest speed. Separation pushes from neighbours by 1/r, cohesion pulls to their mean position,
+alignment to their mean velocity, each within its own radius and field of view. Containment looks
+ahead and steers back from where the agent would be outside.
 
 Differences
 -----------
-The text was not at hand; the behaviours are as it is quoted, where it leaves a choice the plain sum of the three is
-taken. Forces are over the mass: accelerations. The paper lets a vehicle turn at rest and names limits against it; here
-the acceleration across the heading is at most `turn` times the speed, counted as a tenth of v_max where it is less, so
-that an agent at rest can start.
+The text was not at hand; the behaviours are as it is quoted, where it leaves a choice the plain sum
+of the three is taken. Forces are over the mass: accelerations. The paper lets a vehicle turn at
+rest and names limits against it; here the acceleration across the heading is at most `turn` times
+the speed, counted as a tenth of v_max where it is less, so that an agent at rest can start.
 
-ours: an agent seeks its goal, or without one its own heading, at v_max. Containment pushes along a wall's normal, in
-proportion to how far behind the wall the agent would be.
+ours: an agent seeks its goal, or without one its own heading, at v_max. Containment pushes along a
+wall's normal, in proportion to how far behind the wall the agent would be.
 """
 
 import math

@@ -1,15 +1,17 @@
 """Optimised flocking of autonomous drones in confined environments (Vásárhelyi et al. 2018), Eqs 2-11.
 
-A drone wishes to fly at v_flock along its own velocity; neighbours push it away like half a spring (Eqs 2-3) and pull
-its velocity towards theirs where the difference exceeds what an ideal braking curve allows (Eqs 4-7); walls and
-obstacles act as shill agents that fly inwards (Eqs 8-9). The rules are vectors; 2-D and 3-D are the same text.
+A drone wishes to fly at v_flock along its own velocity; neighbours push it away like half a spring
+(Eqs 2-3) and pull its velocity towards theirs where the difference exceeds what an ideal braking
+curve allows (Eqs 4-7); walls and obstacles act as shill agents that fly inwards (Eqs 8-9). The
+rules are vectors; 2-D and 3-D are the same text.
 
 Differences
 -----------
 paper → the authors' program, which decides here because only it reproduces Table S2:
 
 * Eq. 11 caps the sum at v_max. The program always rescales it to v_flock, also when it is shorter; `limit = "rescale"`
-  is that and the default, `limit = "cap"` is Eq. 11 as printed (then phi_vel is 2.9 instead of 3.8 m/s at v_flock = 4).
+  is that and the default, `limit = "cap"` is Eq. 11 as printed (then phi_vel is 2.9 instead of 3.8
+  m/s at v_flock = 4).
 * r0_frict is the absolute distance of Eq. 5; the program's file takes it as an offset to r0_rep.
 * Eqs 6 and 9 print v_i - v_j and v_i - v_s; velocities would then be driven apart. Here as in the program v_j - v_i.
 * The program caps the repulsion of a pair at 6.2 m/s, which no published parameter set reaches: not built.

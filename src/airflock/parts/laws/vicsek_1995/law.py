@@ -1,13 +1,14 @@
 """Novel type of phase transition in a system of self-driven particles (Vicsek et al. 1995), Eqs 1-2.
 
-Each particle flies at constant speed in the mean direction of all within r of it, itself included, turned by a uniform
-random angle of width eta. At low noise and high density all fly alike; at high noise nobody does. Used in a periodic
-square with positions that move by the old velocity (Eq. 1: body.integration = "old", body.speed = v).
+Each particle flies at constant speed in the mean direction of all within r of it, itself included,
+turned by a uniform random angle of width eta. At low noise and high density all fly alike; at high
+noise nobody does. Used in a periodic square with positions that move by the old velocity (Eq. 1:
+body.integration = "old", body.speed = v).
 
 Differences
 -----------
-The paper's lengths and times have no units; here r = 1 m and dt = 1 s. The random angle turns about the vertical; in
-3-D, which the paper does not have, a climb is averaged and kept.
+The paper's lengths and times have no units; here r = 1 m and dt = 1 s. The random angle turns about
+the vertical; in 3-D, which the paper does not have, a climb is averaged and kept.
 """
 
 import math

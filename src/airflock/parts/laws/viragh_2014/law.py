@@ -1,21 +1,23 @@
 """Flocking algorithm for autonomous flying robots (Virágh et al. 2014): Algorithm A of Vásárhelyi et al. 2018, Fig. 1.
 
-Repulsion is half a spring; alignment is viscous friction that decays with the square of the distance, counted from
-r0_rep - r2_frict on; walls align to a shill velocity through a sinusoidal ramp. This is the baseline that the 2018
-model improves on.
+Repulsion is half a spring; alignment is viscous friction that decays with the square of the
+distance, counted from r0_rep - r2_frict on; walls align to a shill velocity through a sinusoidal
+ramp. This is the baseline that the 2018 model improves on.
 
 Differences
 -----------
-The text of 2014 was not at hand, and no check against it is claimed. The transfer function, the wall law, the half
-spring and the order of the terms are those of the authors' later program. The friction kernel is that of two public
-programs after the authors' papers of 2014, written independently (`uav_flocking` of cpswarm for ROS, and a Python
-module of Fudan University); both also let the spring saturate, which is not built: it made no difference here. They
-have D in 1/s² and C_frict in m²/s; the caption of Fig. 1 has 1/s and m²: the same with a time of 1 s.
+The text of 2014 was not at hand, and no check against it is claimed. The transfer function, the
+wall law, the half spring and the order of the terms are those of the authors' later program. The
+friction kernel is that of two public programs after the authors' papers of 2014, written
+independently (`uav_flocking` of cpswarm for ROS, and a Python module of Fudan University); both
+also let the spring saturate, which is not built: it made no difference here. They have D in 1/s²
+and C_frict in m²/s; the caption of Fig. 1 has 1/s and m²: the same with a time of 1 s.
 
-The caption gives c_frict, r_min_frict, r0_rep and p_rep only; r2_frict, c_shill, v_shill and d_wall are open. Our
-choice: c_shill = 1 as in the 2018 paper, v_shill = v_flock as in 2014, d_wall = 25 m, a tenth of the arena, all three
-fixed in advance; r2_frict = r0_rep / 2, chosen after it was seen that phi_corr then is that of the caption (`papers/`
-shows the map). The ramp ends at the wall, as in the later program. The sum is limited to v_max (no rescaling).
+The caption gives c_frict, r_min_frict, r0_rep and p_rep only; r2_frict, c_shill, v_shill and d_wall
+are open. Our choice: c_shill = 1 as in the 2018 paper, v_shill = v_flock as in 2014, d_wall = 25 m,
+a tenth of the arena, all three fixed in advance; r2_frict = r0_rep / 2, chosen after it was seen
+that phi_corr then is that of the caption (`papers/` shows the map). The ramp ends at the wall, as
+in the later program. The sum is limited to v_max (no rescaling).
 """
 
 import math
@@ -84,7 +86,8 @@ def preferred_speed(p):
 def interaction_range(p):
     """Radius within which agents count as one cluster, m: where the friction coefficient falls below 1/100.
 
-    Our choice, because the kernel has no cutoff: sqrt(100 C) is 55 m for the published C, from r0_rep - r2_frict on.
+    Our choice, because the kernel has no cutoff: sqrt(100 C) is 55 m for the published C, from
+    r0_rep - r2_frict on.
     """
     return max(p.r0_rep, p.r0_rep - p.r2_frict + 10.0 * math.sqrt(p.c_frict))
 
