@@ -212,7 +212,8 @@ class VectorFlock(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin all flights: with one seed s those of the seeds s, s + 1, ...; or with one for each."""
-        each: Any = seed if np.ndim(seed) else (check_seed(seed) + number for number in range(self.num_envs))
+        given: Any = seed
+        each = given if np.ndim(given) else (check_seed(given) + number for number in range(self.num_envs))
         seeds = None if seed is None else [check_seed(one) for one in each]
         super().reset(seed=seeds[0] if seeds else None)
         seeds = self._drawn(self.num_envs) if seeds is None else seeds
