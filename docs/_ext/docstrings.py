@@ -21,7 +21,8 @@ def listed(lines: list[str]) -> None:
     within = False
     for line, above, below in zip(lines, ["", *lines[:-1]], [*lines[1:], ""], strict=True):
         match = ITEM.fullmatch(line)
-        if match and (within or not above.strip() and not below.startswith(" ")):
+        indent = len(below) - len(below.lstrip())  # a meaning that goes on does so below its first word
+        if match and (within or not above.strip() and indent in (0, match.start(2))):
             result.append(f"* ``{match[1].replace('`', '')}``: {match[2]}")
             within = True
         elif within and line and (line[0].islower() or line[0] == " ") and not line.startswith("nan "):

@@ -179,6 +179,9 @@ def test_meanings_of_names_become_a_list_and_sections_stay(monkeypatch):
         "* ``far, near``: m,", "  or", "", "nan where none.", "",
     ]  # fmt: skip
     assert kept == section
+    goes_on = ["Lines.", "", "width : of a bin,", "        m", ""]
+    listed(goes_on)
+    assert goes_on == ["Lines.", "", "* ``width``: of a bin,", "  m", ""]
 
 
 @pytest.mark.parametrize("folder", ["gallery", "notebooks", "tours"])
