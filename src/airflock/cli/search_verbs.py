@@ -213,7 +213,7 @@ def _print_tuned(tuning: Any, shown: list[str], as_json: bool = False) -> None:
     terminal.print_result(tuning, as_json)
 
 
-@verb(PANEL, "airflock.league", "quiet json")
+@verb(PANEL, "airflock.league", "threads quiet json")
 def league(o: SimpleNamespace) -> Any:
     """Compare laws on robots in worlds: each is tuned by the same flights and judged on the same held-out seeds.
 
