@@ -138,6 +138,16 @@ def test_the_command_writes_a_scenario_that_flies_the_disturbance(tmp_path):
         assert flown.faults[0].fault.name == row["kind"] and flown.faults[0].agents[0] == row["agent"]
 
 
+@pytest.mark.parametrize(("unit", "dose"), [("1", "a loss of 40%"), ("m", "0.4 m"), ("s", "0.4 s")])
+def test_a_dose_in_a_sentence_has_its_unit_and_a_share_says_of_what(unit, dose):
+    row = disturbances.AttackRow(
+        "motor", unit, 0.4, 0.3, 0.5, 0.5, 1, 2.0, 3.0, math.nan, ((0.4, 50, 100, 0.4, 0.6),), {}, 1, 9.0, 1.0
+    )
+    found = disturbances.AttackResult(small(), "Two agents meet", 0.5, (0, 100), (row,))
+    low = "30%" if unit == "1" else "0.3"
+    assert f"motor: {dose} (between {low} and {dose.replace('4', '5')}, 95 %) for agent 1" in found.text
+
+
 def test_a_flock_that_breaks_as_often_without_a_disturbance_has_no_smallest_dose():
     line = line_of(lambda: airflock.attack(small(duration=10.0), "wind=1", limit=10.0, probability=0.05, budget=0.01))
     assert "breaks without any disturbance" in line and " of 100 flights have the event" in line

@@ -628,7 +628,7 @@ def _flown_flight(
         given = load_recording(given)
     if not isinstance(given, xr.Dataset):
         if seed is None:
-            raise ScenarioError(["seed: is needed to fly the flight again, such as why(scenario, seed=7)"])
+            raise ScenarioError(["seed: is needed to fly the flight again, such as seed 7"])
         scenario = scenario_variant(given, settings, law, trust=trust)
         return _FlownFlight(measured_by_contacts(scenario, limit), check_seed(seed))
     if seed is not None:

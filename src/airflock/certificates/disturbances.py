@@ -147,6 +147,11 @@ def disturbance(text: str, scenario: Scenario) -> Disturbance:
     return made
 
 
+def _amount(dose: float, unit: str) -> str:
+    """Return a dose in words; one without unit is a share that is lost."""
+    return f"a loss of {dose:.0%}" if unit == "1" else f"{dose:.3g} {unit}"
+
+
 @dataclass(frozen=True)
 class AttackRow:
     """The smallest dose of one kind that was found to break the flock.
@@ -246,12 +251,13 @@ class AttackResult:
         said = [f"{self.event}, in {self.undisturbed[0]} of {self.undisturbed[1]} flights without any disturbance."]
         for row in self.rows:
             if math.isinf(row.dose):
-                most = f"{row.curve[-1][0]:.3g} {row.unit}"
+                most = _amount(row.curve[-1][0], row.unit)
                 said.append(f"{row.kind}: nothing up to {most} was found to do so; {row.share:.0%} of flights at most.")
                 continue
-            upper = "more than was tried" if math.isinf(row.high) else f"{row.high:.3g} {row.unit}"
+            upper = "more than was tried" if math.isinf(row.high) else _amount(row.high, row.unit)
             who = "for all" if row.agent is None else f"for agent {row.agent} from {row.at:.3g} s on"
-            span = f"{row.dose:.3g} {row.unit} (between {row.low:.3g} and {upper}, 95 %)"
+            low = f"{row.low:.0%}" if row.unit == "1" else f"{row.low:.3g}"
+            span = f"{_amount(row.dose, row.unit)} (between {low} and {upper}, 95 %)"
             said.append(f"{row.kind}: {span} {who} brings it in {row.share:.0%} of flights.")
         return " ".join(said)
 
@@ -463,7 +469,7 @@ class _Search:
         while time.monotonic() < self.ends:
             if -elites[0][0] >= self.target.probability:
                 smallest, candidates, breaks, stalled = amount, [each for *_, each in elites], True, 0
-                self.notify(f"{self.how.kind}: {amount:.3g} {self.how.unit} breaks it in the search")
+                self.notify(f"{self.how.kind}: {_amount(amount, self.how.unit)} breaks it in the search")
                 amount /= SEARCH_STEP
                 elites = self._raced(candidates, amount)
                 continue
