@@ -172,6 +172,16 @@ def test_a_law_of_ones_own_is_a_further_row_beside_rows_that_are_taken_over(tmp_
         airflock.league(out=tmp_path / "a", resume=True)
 
 
+def test_rows_whose_fitness_is_not_that_of_their_flights_are_not_taken_over(tmp_path, flown):
+    airflock.league(made(tmp_path), tmp_path / "a")
+    text = (tmp_path / "a" / "result.toml").read_text()
+    mean = tomllib.loads(text)["rows"][0]["values"]["fitness"]["mean"]
+    (tmp_path / "b.toml").write_text(text.replace(f"mean = {mean!r}", "mean = 0.99"))
+    with pytest.raises(airflock.AirflockError, match="b.toml: is damaged: .*: its fitness is not that of its flights"):
+        airflock.league(tmp_path / "b.toml", tmp_path / "b")
+    assert not (tmp_path / "b").exists()
+
+
 def test_a_law_that_never_flocks_or_does_not_compile_has_a_row_with_the_reason(tmp_path, flown):
     flown["broken"] = 1
     found = airflock.league(made(tmp_path, laws=("viragh_2014", "couzin_2002", "vasarhelyi_2018")), tmp_path / "a")

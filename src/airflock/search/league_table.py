@@ -419,6 +419,9 @@ def _computed(request: League) -> list[Mapping[str, Any]]:
         rows = [row for row in held["rows"] if row["law"] in request.laws]
         if any(not row["reason"] and len(row["held_out"]) != request.held_out for row in rows):
             raise StudyError(f"{request.source}: is damaged: a row has not {request.held_out} held-out flights")
+        for row in (row for row in rows if not row["reason"]):
+            if not math.isclose(np.mean(row["held_out"]), row["values"]["fitness"]["mean"], rel_tol=1e-9):
+                raise StudyError(f"{request.source}: is damaged: {row['law']}: its fitness is not that of its flights")
         if version := held["versions"]["airflock"] if held["versions"]["airflock"] != __version__ else "":
             raise StudyError(
                 f"{request.source}: was computed by Airflock {version}, this is {__version__}; compute it again"
