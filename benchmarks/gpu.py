@@ -2,8 +2,9 @@
 
     python benchmarks/gpu.py [--quick] [--json FILE] [--only PART] [--trial flock.cu] [--rehearse]
 
-Needs an NVIDIA GPU and `pip install 'airflock[cuda]'`; JAX with its CUDA plugin for the ratio of the big flock. About
-four minutes, --quick one. CUDA C is built with NVRTC, which comes with numba-cuda; --trial also builds and runs a
+Needs an NVIDIA GPU and `pip install 'airflock[cuda]'`; JAX with its CUDA plugin for the ratio of the big flock. At
+most four minutes: each part is a process with a limit of its own (LIMITS), and the table is printed whatever failed.
+CUDA C is built with NVRTC, which comes with numba-cuda; --trial also builds and runs a
 program of its own with nvcc. Only ratios of interleaved runs mean anything: the least time of each side is shown.
 --rehearse goes through every part without a GPU (Numba's simulator, tiny sizes); its figures mean nothing.
 
@@ -15,6 +16,7 @@ import json
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -37,6 +39,14 @@ from airflock.support import gpu as device
 HERE = Path(__file__).parent
 PRESET = "vasarhelyi_2018/4ms"
 COMPARED = ("phi_vel", "phi_corr", "n_min", "r_min_mean", "n_disc", "phi_wall", "phi_lap_abs", "polarisation")
+
+
+# s; a kernel or a compilation cannot be interrupted within a process, so that each part has its own
+LIMITS = {
+    "second start": 30.0, "registers": 20.0, "evaluations": 60.0, "evolution": 40.0, "agreement": 25.0, "apart": 15.0,
+    "big flock": 20.0, "JAX": 30.0, "trial": 60.0,
+}  # fmt: skip
+SLOWER = 20.0  # times a limit is longer in a rehearsal, whose simulator is slow
 
 
 @dataclass
@@ -187,7 +197,7 @@ def second_start(sizes: Sizes) -> dict[str, float]:
     """Seconds from the start of a process to the end of its first launch; later ones find the kernel on disk."""
     n = sizes.generation
     code = (
-        "from airflock.engine.simulate import score_flights\nfrom airflock.scenarios.files import load\n"
+        "from airflock import load\nfrom airflock.engine import score_flights\n"
         f"s = load({PRESET!r}, {{'duration': {min(1.0, sizes.duration)}, 'agents': {sizes.agents}}})\n"
         f"score_flights([s] * {n}, list(range({n})), device='cuda')\nimport time; print(time.time())"
     )
@@ -207,8 +217,8 @@ def rehearsing() -> bool:
     return "rehearsal" in sys.modules
 
 
-def big_flock(sizes: Sizes) -> dict[str, Any]:
-    """Steps per second of one flock by cells, beside the same boids in JAX, in turn, each time from its start."""
+def our_flock(sizes: Sizes) -> tuple[Any, Callable[[], Any], Callable[[], float]]:
+    """Scenario of the big flock, a function that flies it from its start, and one that counts neighbours."""
     from airflock.engine.cuda.large_flock import LargeFlock
 
     scenario = load("zapotecatl_2016/literal", crowd_settings(sizes.boids))
@@ -222,28 +232,41 @@ def big_flock(sizes: Sizes) -> dict[str, Any]:
         crowd.advance(sizes.steps)
         device.cuda_runtime().synchronize()
 
-    sides: dict[str, Callable[[], Any]] = {"airflock": advance}
-    fault = boids_jax.missing()
-    if fault is None and "gpu" not in boids_jax.devices() and not rehearsing():
-        fault = "JAX sees no GPU; it needs its CUDA plugin"
-    found: dict[str, Any] = {"boids": sizes.boids}
-    if fault is None:
-        start = boids_jax.random_start(scenario, 1)
-        found["apart in float64"] = boids_jax.difference(crowd_settings, min(2000, sizes.boids), 10)
-        flock = boids_jax.Boids(scenario, start[:3].T, start[3:].T)
-        at = flock.x, flock.v, flock.number
+    return scenario, advance, lambda: float(crowd.neighbours())
 
-        def advance_jax() -> None:
-            flock.x, flock.v, flock.number = at
-            flock.advance(sizes.steps)
 
-        sides["JAX"] = advance_jax
-    taken = least(sides, 5)
-    found["neighbours"] = round(crowd.neighbours(), 2)
+def big_flock(sizes: Sizes) -> dict[str, Any]:
+    """Steps per second of one flock by cells, each time from its start."""
+    _, advance, neighbours = our_flock(sizes)
+    (taken,) = least({"airflock": advance}, 5).values()
+    return {
+        "boids": sizes.boids,
+        "airflock steps per second": round(sizes.steps / taken, 1),
+        "neighbours": round(neighbours(), 2),
+    }
+
+
+def against_jax(sizes: Sizes) -> dict[str, Any]:
+    """The big flock beside the same boids in JAX, in turn, ten steps each time from their start."""
+    sizes = replace(sizes, steps=min(10, sizes.steps))
+    reason = boids_jax.missing()
+    if reason is None and "gpu" not in boids_jax.devices() and not rehearsing():
+        reason = "JAX sees no GPU; it needs its CUDA plugin"
+    if reason is not None:
+        return {"without JAX": reason}
+    scenario, advance, _ = our_flock(sizes)
+    start = boids_jax.random_start(scenario, 1)
+    found: dict[str, Any] = {"apart in float64": boids_jax.difference(crowd_settings, min(2000, sizes.boids), 10)}
+    flock = boids_jax.Boids(scenario, start[:3].T, start[3:].T)
+    at = flock.x, flock.v, flock.number
+
+    def advance_jax() -> None:
+        flock.x, flock.v, flock.number = at
+        flock.advance(sizes.steps)
+
+    taken = least({"airflock": advance, "JAX": advance_jax}, 2)
     found |= {f"{name} steps per second": round(sizes.steps / t, 1) for name, t in taken.items()}
-    if fault is None:
-        return found | {"speed against JAX": round(taken["JAX"] / taken["airflock"], 2)}
-    return found | {"without JAX": fault}
+    return found | {"speed against JAX": round(taken["JAX"] / taken["airflock"], 2)}
 
 
 def crowd_settings(agents: int) -> dict[str, Any]:
@@ -262,6 +285,21 @@ def say(value: Any) -> None:
     print(value if isinstance(value, str) else json.dumps(value), flush=True)
 
 
+def in_process(name: str, given: argparse.Namespace) -> Any:
+    """What a part measures, in a process that its limit ends."""
+    limit = LIMITS[name] * (SLOWER if given.rehearse else 1.0)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "part.json"
+        command = [sys.executable, str(HERE / "gpu.py"), "--part", name, "--json", str(file)]
+        command += [flag for flag in ("--quick", "--rehearse") if getattr(given, flag[2:])]
+        command += ["--trial", str(given.trial)] if given.trial else []
+        try:
+            ended = subprocess.run(command, timeout=limit, check=False).returncode
+        except subprocess.TimeoutExpired:
+            return f"failed: over its limit of {limit:g} s"
+        return json.loads(file.read_text()) if file.exists() else f"failed: ended with status {ended}"
+
+
 def main() -> None:
     """Measure everything."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -270,6 +308,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--trial", type=Path)
     parser.add_argument("--only", action="append", metavar="PART", help="one of the parts, by its printed name")
+    parser.add_argument("--part", help=argparse.SUPPRESS)
     given = parser.parse_args()
     sizes = QUICK if given.quick else Sizes()
     if given.rehearse:
@@ -278,8 +317,6 @@ def main() -> None:
         sizes = rehearsal.begin(Sizes)
     device.require_gpu()
     scenario = load(PRESET, {"duration": sizes.duration, "agents": sizes.agents})
-    found: dict[str, Any] = {"devices": device.describe_gpus()}
-    say(found)
     parts: dict[str, Callable[[], Any]] = {
         "second start": lambda: second_start(sizes),
         "registers": lambda: registers(scenario),
@@ -288,17 +325,22 @@ def main() -> None:
         "agreement": lambda: agreement(scenario, sizes.flights),
         "apart": lambda: apart(load(PRESET, {"duration": sizes.apart, "agents": sizes.agents})),
         "big flock": lambda: big_flock(sizes),
+        "JAX": lambda: against_jax(sizes),
     }
     if given.trial:
         parts["trial"] = lambda: cuda_c.trial(given.trial)
-    for name, part in parts.items():
-        if given.only and name not in given.only:
-            continue
-        begin = time.perf_counter()
+    if given.part:  # the process of one part: its figures go to the parent's file
         try:
-            found[name] = part()
-        except Exception as fault:  # the other figures are wanted all the same
-            found[name] = f"failed: {type(fault).__name__}: {str(fault)[:2000]}"
+            value = parts[given.part]()
+        except Exception as error:  # the other figures are wanted all the same
+            value = f"failed: {type(error).__name__}: {str(error)[:2000]}"
+        given.json.write_text(json.dumps(value))
+        return
+    found: dict[str, Any] = {"devices": device.describe_gpus()}
+    say(found)
+    for name in [name for name in parts if not given.only or name in given.only]:
+        begin = time.perf_counter()
+        found[name] = in_process(name, given)
         say({name: found[name], "took_s": round(time.perf_counter() - begin, 1)})
         if given.json:
             given.json.write_text(json.dumps(found, indent=1))

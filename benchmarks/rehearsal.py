@@ -37,15 +37,21 @@ def begin(sizes: Callable[..., Any] = SimpleNamespace) -> Any:
     import cuda_c
     from numba.cuda.simulator.kernel import FakeCUDAKernel
 
+    from airflock import support
     from airflock.engine.cuda import large_flock, launch
     from airflock.support import gpu as device
 
     device.unavailable_reason = lambda: None
     device.describe_gpus = lambda: [{"name": "rehearsal"}]
-    for module in (device, launch, large_flock):
-        module.required = lambda simulated=False: None
-        module.free_memory = lambda: 10**9
-        module.multiprocessors = lambda: 2
+    stand_ins = {
+        "require_gpu": lambda allow_simulator=False: None,
+        "free_gpu_memory": lambda: 10**9,
+        "multiprocessor_count": lambda: 2,
+    }
+    for module in (device, support, launch, large_flock):
+        for name, stand_in in stand_ins.items():
+            if hasattr(module, name):
+                setattr(module, name, stand_in)
     plain = launch.layout_of
 
     def layout_of(plan: Any, agents: int, flocks: int, processors: int = 2) -> Any:
