@@ -36,6 +36,7 @@ SWARM = {"start.separation": 0.0, "start.kind": "ball", "metrics.kind": "order",
 PLANS = {
     "paper": ("vasarhelyi_2018", {"agents": 12, "world.walls": "nearest_per_axis", "metrics.r_coll": 8.0}),
     "storm": ("viragh_2014", {
+        "model.r2_frict": 20.0,  # friction that lets some leave the arena
         "agents": 9, "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.east": 1.0,
         "sensors.period": 0.15,  # an odd number of steps: decisions fall between the two steps of one draw
         "wind.gust": 2.0, "start.speed": 3.0, "metrics.r_coll": 7.0, "metrics.collision_period": 0.03,

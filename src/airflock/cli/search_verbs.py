@@ -62,12 +62,11 @@ def evolve(o: SimpleNamespace, errors: ErrorCollector) -> None:
     mended = runs.open_folder(place, study, resume=o.resume)
     notes = [*(note for each in study.scenarios for note in each.notes), *study.notes, taken, mended]
     terminal.print_notes([note for note in notes if note])
-    if not o.quiet:
-        terminal.print_message(search.study_plan(study))
     begin = time.perf_counter()
     executor = search.study_executor(study, o.scheduler, o.threads, o.timeout)
     with run_progress(o.quiet or o.json) as watch:
-        result = search.run_study(study, place, executor, watch, sensitivity=o.sensitivity)
+        say = None if o.quiet else terminal.print_message
+        result = search.run_study(study, place, executor, watch, sensitivity=o.sensitivity, say=say)
     if o.json or not o.quiet:
         terminal.print_result(result, o.json, folder=str(o.out), seconds=time.perf_counter() - begin)
     if result.dead_reason:

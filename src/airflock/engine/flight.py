@@ -1289,8 +1289,8 @@ def open_many(
 
     Raises
     ------
-    ScenarioError, FlightError
-        If a scenario cannot be loaded, or cannot give what is observed.
+    ScenarioError, ParameterError, FlightError
+        If a scenario cannot be loaded or cannot give what is observed, or a seed is none.
 
     Examples
     --------

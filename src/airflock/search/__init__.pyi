@@ -7,7 +7,6 @@ from .evolution import (
     resolve_device as resolve_device,
     run_study as run_study,
     study_executor as study_executor,
-    study_plan as study_plan,
     validate as validate,
 )
 from .hardening import (

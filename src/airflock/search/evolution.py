@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -209,16 +209,20 @@ def run_study(
     on_progress: OnProgress | None = None,
     *,
     sensitivity: str = "",
+    say: Callable[[str], None] | None = None,
 ) -> EvolveResult:
     """Search and conclude in a folder that `open_folder` has accepted; close the executor.
 
     sensitivity : a method, "" for that of an earlier call
+    say         : takes the plan of flights, once the folder and the workers are there
     """
     if sensitivity:
         open_folder(folder, study, also={"sensitivity": sensitivity})
     elif (folder / REQUEST_FILE).is_file():  # a folder of one's own may hold flights alone
         sensitivity = (read_request(folder, study.kind) or {}).get("also", {}).get("sensitivity", "")
     with open_run(folder, executor) as store:
+        if say is not None:
+            say(study_plan(study))
         centres = run_search(study, store, executor, on_progress)
         result = conclude_study(study, store, executor, centres, folder, on_progress)
         if sensitivity:
