@@ -40,7 +40,8 @@ try:
 except ImportError as error:
     raise AirflockError("environments need gymnasium and pettingzoo: pip install 'airflock[learn]'") from error
 
-SCENARIOS: dict[str, tuple[str, dict[str, Any], str | None]] = {  # of the registered ids: preset, settings, law
+# Preset, settings and law of the registered ids.
+SCENARIOS: dict[str, tuple[str, dict[str, Any], str | None]] = {
     "Flock": ("vasarhelyi_2018/4ms", {"agents": 20, "duration": 120.0, "world.side": 120.0}, None),
     "Corridor": (
         "vasarhelyi_2018/obstacles",
@@ -59,11 +60,15 @@ LARGEST = {  # numbers of the laws, else of the body, that bound a command: the 
     "velocity": ("v_max", "v_flock", "speed", "speed_max"),
     "acceleration": ("a_max",),
 }
-MARGIN = 1.0 + 1e-5  # rounding: a law that cuts a vector to its largest length may exceed that by a bit
+# Rounding: a law that cuts a vector to its largest length may exceed that by a bit.
+MARGIN = 1.0 + 1e-5
 
 
 def largest_command(scenario: Scenario) -> float:
-    """Return how large a component of a command can be, in its unit. Raises FlightError where no number says so."""
+    """Return how large a component of a command can be, in its unit.
+
+    Raises FlightError where no number says so.
+    """
     kind = scenario.model.command
     if kind == "heading":
         return 1.0
@@ -228,7 +233,8 @@ class VectorFlock(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Fly all to their next decisions."""
-        over = np.flatnonzero(self.episodes.flights.over)  # they stay where they are, and earn nothing
+        # They stay where they are, and earn nothing.
+        over = np.flatnonzero(self.episodes.flights.over)
         rewards, ended, cut = self.episodes.step(actions)
         self.episodes.reset(dict(zip(over.tolist(), self._drawn(len(over)), strict=True)))
         ended[over] = cut[over] = False
