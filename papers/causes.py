@@ -1,7 +1,7 @@
 """Fly again what shows why some sentences are not reproduced: `python papers/causes.py NAME [SEEDS]`.
 
 Names: diagonal (fig4.diagonal), shill (model.shill_terms.6ms), collisions (minimum.f_collision), fitness
-(controller.fitness), ranges (s1.range), nearest (fig3.minimum), algorithm_a (fig1.a), turns (limits.turns), against
+(controller.fitness), ranges (s1.range), nearest (fig3.minimum), turns (limits.turns), against
 (limits.delay, limits.noise), crowd (pressure.free), best (quality.best). One line a set of flights; the figures stand
 as reasons in the pages' statements.
 """
@@ -23,7 +23,7 @@ from airflock_papers.dimock_2003.controller import STARTS
 from airflock_papers.dimock_2003.flights import Birds, Task
 from airflock_papers.dimock_2003.units import BEST, FT_LBF
 from airflock_papers.flights import with_changes
-from airflock_papers.vasarhelyi_2018 import fig1, outdoor, pressure, real
+from airflock_papers.vasarhelyi_2018 import outdoor, pressure, real
 from airflock_papers.vasarhelyi_2018.limits import IN_TURNS, QUARTER, turn_rate
 from airflock_papers.vasarhelyi_2018.published import optimum
 from airflock_papers.vasarhelyi_2018.tuning import SETTLED, SPEEDS
@@ -65,18 +65,6 @@ NEAREST: dict[str, tuple[str, dict[str, Any]]] = {
     "8 m/s, repulsion of 4 m/s": ("real_8ms", REPULSION[4]),
 }
 # Algorithm A at the delay of Table S5: constants of the caption, what it leaves open, and the delay
-OF_A: tuple[dict[str, float], ...] = (
-    {},
-    *({"model.p_rep": p} for p in (0.5, 0.2, 0.1, 0.05)),
-    *({"model.r0_rep": r} for r in (15.0, 10.0)),
-    *({"model.c_frict": c} for c in (100.0, 10.0, 3.0)),
-    *({"model.r_min_frict": r} for r in (10.0, 20.0)),
-    *({"agents": n} for n in (10, 30, 50)),
-    {"sensors.noise": 0.0, "body.noise": 0.0},
-    *({"body.tau": tau} for tau in (0.5, 0.2)),
-    {"body.a_max": 20.0},
-    *({"radio.delay": t} for t in (0.7, 0.5, 0.3)),
-)
 CROWD: tuple[dict[str, Any], ...] = ({}, {"model.c_frict": 0.2}, {"model.p_rep": "times 2"}, {"radio.delay": 0.2})
 LAGS = (-4.0, -2.0, 0.0, 1.0, 2.0, 3.0, 4.0)  # s, from a turn to the order that is looked at
 READINGS: tuple[dict[str, Any], ...] = (
@@ -189,14 +177,6 @@ def nearest(seeds: int = 10, first: int = 6000) -> None:
         tell(name, f"{shares.mean():.3f} ± {half:.3f}, mean {np.mean([each.mean() for each in least]):.1f} m")
 
 
-def algorithm_a(seeds: int = 6, first: int = 100) -> None:
-    """Order and speed (m/s) of Algorithm A, by constants, and its nearest neighbours (m)."""
-    for keys in OF_A:
-        flown = airflock.score(fig1.algorithm_a(keys), range(first, first + seeds))
-        corr, vel, near = (flown[name].mean() for name in ("phi_corr", "phi_vel", "r_min_mean"))
-        tell(in_words(keys) or "as the page", f"phi_corr {corr:.2f}, phi_vel {vel:.2f} m/s, nearest {near:.1f} m")
-
-
 def turns(seeds: int = 20, first: int = 0) -> None:
     """What the optima of Table S1 lose in turns and some time after them, by whether the flock circles."""
     for v in SPEEDS:
@@ -287,8 +267,7 @@ def tell(name: str, found: str) -> None:
 
 
 CAUSES: dict[str, Callable[..., None]] = {
-    each.__name__: each
-    for each in (diagonal, shill, collisions, fitness, ranges, nearest, algorithm_a, turns, against, crowd, best)
+    each.__name__: each for each in (diagonal, shill, collisions, fitness, ranges, nearest, turns, against, crowd, best)
 }
 
 if __name__ == "__main__":

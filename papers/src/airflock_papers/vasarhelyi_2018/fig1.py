@@ -89,7 +89,7 @@ def measured(data: Data) -> list[Measured]:
         found.append(Measured(f"fig1.a.kernel.{column}", column, AT_A, statistics.mean(a[column]), note))
     found.append(Measured("fig1.a.phi_vel", "phi_vel", "algorithm A, 4 m/s", statistics.mean(a["phi_vel"])))
     gap = statistics.difference(b["phi_corr"], a["phi_corr"])
-    found.append(Measured("fig1.better.coherence", "phi_corr", "algorithm B less algorithm A, 4 m/s", gap))
+    found.append(Measured("fig1.gap.coherence", "phi_corr", "algorithm B less algorithm A, 4 m/s", gap))
     return [*found, *_transients(data), _map(data)]
 
 
@@ -117,7 +117,7 @@ def _transients(data: Data) -> list[Measured]:
     apart = f"algorithm A less algorithm B, each until {SHARE:g} of its long-time mean"
     return [
         Measured("fig1.transient", "transient", at, statistics.mean(times["b"]), note),
-        Measured("fig1.better.transient", "transient", apart, statistics.difference(times["a"], times["b"]), note),
+        Measured("fig1.gap.transient", "transient", apart, statistics.difference(times["a"], times["b"]), note),
     ]
 
 
