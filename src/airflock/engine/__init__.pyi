@@ -10,7 +10,8 @@ from .closed_flights import (
 )
 from .driver_state import DriverState as DriverState
 from .drivers import load_loops as load_loops
-from .flight import Flight as Flight, Snapshot as Snapshot, open_many as open_many
+from .flight import Flight as Flight, Snapshot as Snapshot
+from .many_flights import open_many as open_many
 from .measuring import measure_frames as measure_frames
 from .plan import Plan as Plan, plan_of as plan_of
 from .text.generate import DriverSource as DriverSource
